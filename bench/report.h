@@ -1,0 +1,42 @@
+// What `kinespace bench NAME` gives back: one row per measured number, with the bar it should reach.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace kinespace {
+
+struct BenchResult {
+  std::string name;  // what was measured
+  std::string data;  // on what
+  double value = 0;
+  std::string unit;
+  std::optional<double> bar;  // what the value should reach; none: only reported
+  bool higher_is_better = false;
+  // True without a bar; else value <= bar, or value >= bar where higher is better.
+  [[nodiscard]] bool ok() const { return !bar || (higher_is_better ? value >= *bar : value <= *bar); }
+};
+
+struct BenchReport {
+  std::string bench;
+  std::string device;  // what computed
+  int threads = 1;
+  std::vector<BenchResult> results;
+};
+
+struct BenchOptions {
+  std::filesystem::path data;                  // folder with cmu/, bandai1/, bandai2/
+  std::optional<std::filesystem::path> golden;  // folder of golden FPCA cases
+  std::string device = "auto";
+};
+
+// Every bench the command knows; each lives in bench/<name>.cpp. Throws Error{bad_input} when its data is missing.
+[[nodiscard]] BenchReport bench_dtw(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_fpca(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_io(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_retrieval(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_space(const BenchOptions& options);
+
+}  // namespace kinespace

@@ -1,0 +1,30 @@
+# kinespace_module(NAME SOURCES a.cpp ... [DEPENDS target ...] [PRIVATE_DEPENDS target ...])
+# makes the library kinespace_NAME of one folder, with the project's warnings, and queues it for installation.
+set(KINESPACE_MODULES "" CACHE INTERNAL "modules, in the order of the arrows")
+
+add_library(kinespace_build_flags INTERFACE)
+target_compile_options(kinespace_build_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast
+  -Wno-restrict  # GCC 12 sees overlaps that are not there in "literal" + std::string (GCC bug 105651)
+  $<$<BOOL:${KINESPACE_WERROR}>:-Werror>)
+if(KINESPACE_SANITIZE)
+  target_compile_options(kinespace_build_flags INTERFACE -fsanitize=${KINESPACE_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(kinespace_build_flags INTERFACE -fsanitize=${KINESPACE_SANITIZE})
+endif()
+
+function(kinespace_module name)
+  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  set(target kinespace_${name})
+  add_library(${target} STATIC ${arg_SOURCES})
+  add_library(kinespace::${name} ALIAS ${target})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
+  target_compile_features(${target} PUBLIC cxx_std_20)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/kinespace>)
+  target_link_libraries(${target} PUBLIC ${arg_DEPENDS} PRIVATE ${arg_PRIVATE_DEPENDS} $<BUILD_INTERFACE:kinespace_build_flags>)
+  set(KINESPACE_MODULES ${KINESPACE_MODULES} ${name} CACHE INTERNAL "modules, in the order of the arrows")
+endfunction()
+
+# kinespace_precompile(TARGET): the Eigen headers, which most of our translation units pay for, once.
+function(kinespace_precompile target)
+  target_precompile_headers(${target} PRIVATE <Eigen/Core> <Eigen/Geometry> <vector> <string> <span> <algorithm>)
+endfunction()

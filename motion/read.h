@@ -1,0 +1,21 @@
+// Motion files in and out, by their ending.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "motion/clip.h"
+
+namespace kinespace {
+
+// Reads .bvh, or .amc with its .asf: `asf` when given, else the one .asf file beside it whose name starts the AMC's
+// (01_02.amc -> 01.asf), else the only .asf in the folder. Throws Error.
+[[nodiscard]] Clip read_clip(const std::filesystem::path& path, const std::optional<std::filesystem::path>& asf = {});
+
+// Writes .bvh, .amc (with an .asf beside it), .glb or .gltf. The file is whole or not there. Throws Error.
+void write_clip(const std::filesystem::path& path, const Clip& clip);
+
+// True for endings that read_clip takes.
+[[nodiscard]] bool is_motion_file(const std::filesystem::path& path);
+
+}  // namespace kinespace
