@@ -2,9 +2,14 @@
 # makes the library kinespace_NAME of one folder, with the project's warnings, and queues it for installation.
 set(KINESPACE_MODULES "" CACHE INTERNAL "modules, in the order of the arrows")
 
+set(CMAKE_CXX_EXTENSIONS OFF)
 add_library(kinespace_build_flags INTERFACE)
 target_compile_options(kinespace_build_flags INTERFACE
+  -ffp-contract=off   # the same bits whatever the processor
+  -fpch-preprocess)   # lets ccache see through precompiled headers
+target_compile_options(kinespace_build_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast
+  -Wno-missing-field-initializers  # designated initialisers leave fields at their defaults on purpose
   -Wno-restrict  # GCC 12 sees overlaps that are not there in "literal" + std::string (GCC bug 105651)
   $<$<BOOL:${KINESPACE_WERROR}>:-Werror>)
 if(KINESPACE_SANITIZE)
