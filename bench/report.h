@@ -3,7 +3,9 @@
 
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace kinespace {
@@ -27,10 +29,22 @@ struct BenchReport {
 };
 
 struct BenchOptions {
-  std::filesystem::path data;                  // folder with cmu/, bandai1/, bandai2/
+  std::filesystem::path data;                   // folder with cmu/, bandai1/, bandai2/
   std::optional<std::filesystem::path> golden;  // folder of golden FPCA cases
   std::string device = "auto";
 };
+
+// The report as a markdown table: a heading, what computed it, one row a result. What docs/results.md is made of.
+[[nodiscard]] std::string to_markdown(const BenchReport& report);
+
+// A bench by its name, as the command offers it.
+struct Bench {
+  std::string_view name;
+  BenchReport (*run)(const BenchOptions& options);
+};
+
+// All benches that this build has, by name.
+[[nodiscard]] std::span<const Bench> all_benches();
 
 // Every bench the command knows; each lives in bench/<name>.cpp. Throws Error{bad_input} when its data is missing.
 [[nodiscard]] BenchReport bench_dtw(const BenchOptions& options);

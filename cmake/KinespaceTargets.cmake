@@ -33,3 +33,12 @@ endfunction()
 function(kinespace_precompile target)
   target_precompile_headers(${target} PRIVATE <Eigen/Core> <Eigen/Geometry> <vector> <string> <span> <algorithm>)
 endfunction()
+
+# kinespace_list(TARGET FILE MACRO NAME...): writes FILE, a list of `MACRO(NAME)` lines that TARGET includes by path, so that
+# a new subcommand or bench is one source file and one name.
+function(kinespace_list target file macro)
+  list(TRANSFORM ARGN REPLACE "^(.+)$" "${macro}(\\1)\n" OUTPUT_VARIABLE lines)
+  string(JOIN "" text ${lines})
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/generated/${file} CONTENT "${text}" @ONLY)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_BINARY_DIR}/generated>)
+endfunction()

@@ -1,0 +1,62 @@
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "base/file.h"
+#include "cli/commands.h"
+#include "cli/json_output.h"
+#include "motion/read.h"
+
+namespace kinespace::cli {
+namespace {
+
+struct ConvertOptions {
+  std::filesystem::path input;
+  std::filesystem::path output;
+  std::optional<std::filesystem::path> asf;
+  bool json = false;
+};
+
+// Every file the conversion would write against every file it reads.
+void require_inputs_survive(const ConvertOptions& options) {
+  std::vector<std::filesystem::path> outputs{options.output};
+  if (options.output.extension() == ".amc")
+    outputs.push_back(std::filesystem::path(options.output).replace_extension(".asf"));
+  std::vector<std::filesystem::path> inputs{options.input};
+  if (options.asf) inputs.push_back(*options.asf);
+  for (const auto& output : outputs) {
+    for (const auto& input : inputs) require_different_files(input, output);
+  }
+}
+
+void convert(const ConvertOptions& options, Session& session) {
+  require_inputs_survive(options);
+  const Clip clip = read_clip(options.input, options.asf);
+  Session::check_stop();
+  write_clip(options.output, clip);
+  if (options.json) {
+    print_json({{"output", options.output.string()},
+                {"frames", clip.frames},
+                {"rate_hz", clip.rate_hz},
+                {"joints", clip.skeleton.joint_count()}});
+  } else {
+    session.note(fmt::format("{}: {} frames at {:.6g} Hz, {} joints", options.output.string(), clip.frames,
+                             clip.rate_hz, clip.skeleton.joint_count()));
+  }
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand("convert", "Convert a clip between BVH, ASF/AMC and glTF (glTF: write only)");
+  const auto options = std::make_shared<ConvertOptions>();
+  command->add_option("IN", options->input, "A .bvh file, or an .amc file with its .asf beside it")->required();
+  command->add_option("OUT", options->output, "Where to: .bvh, .amc (writes the .asf too), .glb or .gltf")->required();
+  command->add_option("--asf", options->asf, "The skeleton of an .amc input");
+  command->add_flag("--json", options->json, "Print what was written as JSON");
+  command->callback([options, &session] { convert(*options, session); });
+}
+
+}  // namespace kinespace::cli

@@ -1,0 +1,67 @@
+#include "cli/session.h"
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <system_error>
+
+#include <fmt/format.h>
+
+namespace kinespace::cli {
+namespace {
+
+// A signal handler can reach nothing but a global. Lock-free, so that the handler may write it.
+std::atomic<int> caught_signal{0};
+static_assert(std::atomic<int>::is_always_lock_free);
+
+void remember(int signal) {
+  caught_signal.store(signal, std::memory_order_relaxed);
+}
+
+}  // namespace
+
+void catch_stop_signals() {
+  struct sigaction action {};
+  action.sa_handler = remember;
+  action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+  for (const int signal : {SIGINT, SIGTERM}) {
+    struct sigaction inherited {};
+    const bool known = ::sigaction(signal, nullptr, &inherited) == 0;
+    if (known && inherited.sa_handler == SIG_IGN) continue;  // whoever started us (nohup, a shell's &) wants it ignored
+    if (!known || ::sigaction(signal, &action, nullptr) != 0) {
+      throw std::system_error(errno, std::generic_category(), "sigaction");
+    }
+  }
+}
+
+int stop_signal() noexcept {
+  return caught_signal.load(std::memory_order_relaxed);
+}
+
+Progress Session::progress() {
+  Progress progress;
+  progress.stop_requested = [] { return stop_signal() != 0; };
+  if (!quiet) {
+    bar_ = std::make_unique<ProgressBar>(stderr);
+    progress.report = [this](std::string_view stage, double done) {
+      if (bar_) bar_->show(stage, done);
+    };
+  }
+  return progress;
+}
+
+void Session::note(std::string_view text) {
+  finish_progress();
+  if (!quiet) fmt::print(stderr, "kinespace: {}\n", text);
+}
+
+void Session::detail(std::string_view text) {
+  if (verbose) note(text);
+}
+
+void Session::check_stop() {
+  if (stop_signal() != 0) throw Interrupted{};
+}
+
+}  // namespace kinespace::cli

@@ -1,0 +1,40 @@
+// What every subcommand shares: the global options, the progress display, the wish to stop, and notes to the user.
+#pragma once
+
+#include <memory>
+#include <string_view>
+
+#include "base/progress.h"
+#include "cli/progress_bar.h"
+
+namespace kinespace::cli {
+
+// From here on Ctrl-C (SIGINT) and SIGTERM only leave a mark, which the work polls; the second one ends the process at
+// once.
+void catch_stop_signals();
+// The signal that came, 0 while none did.
+[[nodiscard]] int stop_signal() noexcept;
+
+class Session {
+ public:
+  bool quiet = false;    // no progress and no notes, only results and errors
+  bool verbose = false;  // more notes
+
+  // For the library's long calls: reports to the bar (unless quiet) and stops on a signal. It must not outlive the
+  // session.
+  [[nodiscard]] Progress progress();
+  // Ends the bar, before results are printed.
+  void finish_progress() { bar_.reset(); }
+
+  // A line "kinespace: TEXT" on standard error; `note` unless quiet, `detail` only when verbose.
+  void note(std::string_view text);
+  void detail(std::string_view text);
+
+  // Throws Interrupted when a stop was asked for. For between two calls that have no Progress of their own.
+  static void check_stop();
+
+ private:
+  std::unique_ptr<ProgressBar> bar_;
+};
+
+}  // namespace kinespace::cli
