@@ -53,9 +53,14 @@ Clip::TranslationTrack& Clip::require_translation_track(int joint) {
 
 Clip make_clip(std::string name, Skeleton skeleton, double rate_hz, int frames) {
   assert(rate_hz > 0 && frames >= 1);
-  Clip clip{.name = std::move(name), .skeleton = std::move(skeleton), .rate_hz = rate_hz, .frames = frames,
-            .rotations = {}, .translations = {}};
-  clip.rotations.assign(static_cast<std::size_t>(clip.skeleton.joint_count()) * static_cast<std::size_t>(frames) * 4, 0);
+  Clip clip{.name = std::move(name),
+            .skeleton = std::move(skeleton),
+            .rate_hz = rate_hz,
+            .frames = frames,
+            .rotations = {},
+            .translations = {}};
+  clip.rotations.assign(static_cast<std::size_t>(clip.skeleton.joint_count()) * static_cast<std::size_t>(frames) * 4,
+                        0);
   for (std::size_t i = 0; i < clip.rotations.size(); i += 4) clip.rotations[i] = 1;
   return clip;
 }
@@ -64,7 +69,8 @@ Clip slice(const Clip& clip, int first, int count) {
   assert(first >= 0 && count >= 1 && first + count <= clip.frames);
   Clip out = make_clip(clip.name, clip.skeleton, clip.rate_hz, count);
   for (int j = 0; j < clip.skeleton.joint_count(); ++j) {
-    const auto from = clip.rotation_track(j).subspan(static_cast<std::size_t>(first) * 4, static_cast<std::size_t>(count) * 4);
+    const auto from =
+        clip.rotation_track(j).subspan(static_cast<std::size_t>(first) * 4, static_cast<std::size_t>(count) * 4);
     std::ranges::copy(from, out.rotation_track(j).begin());
   }
   for (const auto& track : clip.translations) {

@@ -4,11 +4,12 @@
 // contiguous in time, so that a joint's curve is one span.
 #pragma once
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <span>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "motion/skeleton.h"
 
@@ -21,11 +22,11 @@ struct Clip {
     std::vector<Eigen::Vector3d> values;  // cm, one a frame
   };
 
-  std::string name;                          // as the user knows it: the file name without its ending
+  std::string name;  // as the user knows it: the file name without its ending
   Skeleton skeleton;
-  double rate_hz = 0;                        // frames per second, > 0
-  int frames = 0;                            // >= 1
-  std::vector<double> rotations;             // [joint][frame][w x y z]; identity for joints without rotation channels
+  double rate_hz = 0;                          // frames per second, > 0
+  int frames = 0;                              // >= 1
+  std::vector<double> rotations;               // [joint][frame][w x y z]; identity for joints without rotation channels
   std::vector<TranslationTrack> translations;  // by joint, ascending; only joints that move in this clip
 
   [[nodiscard]] double duration_s() const { return (frames - 1) / rate_hz; }

@@ -3,9 +3,10 @@
 //   world(j) = world(parent(j)) * T(translation_j) * R(rotation_j)
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <vector>
 
 #include "motion/clip.h"
 

@@ -12,7 +12,9 @@ bool Joint::has_rotation() const {
   return std::ranges::any_of(channels, [](Channel c) { return !is_position(c); });
 }
 
-bool Joint::has_position() const { return std::ranges::any_of(channels, is_position); }
+bool Joint::has_position() const {
+  return std::ranges::any_of(channels, is_position);
+}
 
 int Skeleton::find(std::string_view name) const {
   const auto found = std::ranges::find(joints, name, &Joint::name);

@@ -3,7 +3,6 @@
 // Units: centimetres, Y up, right-handed. Joints stand in file order, every parent before its children, joint 0 first.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -11,25 +10,31 @@
 #include <string_view>
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace kinespace {
 
 // One channel of a joint, in the order the file has it. Rotation channels apply left to right: the local rotation is
 // the product R(first) * R(second) * R(third) of rotations about the named axes (BVH's convention).
 enum class Channel : std::uint8_t { x_position, y_position, z_position, x_rotation, y_rotation, z_rotation };
 
-[[nodiscard]] constexpr bool is_position(Channel c) { return c <= Channel::z_position; }
+[[nodiscard]] constexpr bool is_position(Channel c) {
+  return c <= Channel::z_position;
+}
 // 0, 1, 2 for X, Y, Z.
-[[nodiscard]] constexpr int axis_of(Channel c) { return static_cast<int>(c) % 3; }
+[[nodiscard]] constexpr int axis_of(Channel c) {
+  return static_cast<int>(c) % 3;
+}
 
 struct Joint {
   std::string name;
-  int parent = -1;                                    // index into Skeleton::joints; -1 for joint 0 only
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();   // cm, in the parent's frame: where the joint is at rest
-  std::vector<Channel> channels;                      // at most 6, no channel twice
-  std::optional<Eigen::Vector3d> end_site;            // cm, in this joint's frame; only a leaf has one
+  int parent = -1;                                   // index into Skeleton::joints; -1 for joint 0 only
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  // cm, in the parent's frame: where the joint is at rest
+  std::vector<Channel> channels;                     // at most 6, no channel twice
+  std::optional<Eigen::Vector3d> end_site;           // cm, in this joint's frame; only a leaf has one
 
   [[nodiscard]] bool has_rotation() const;
-  [[nodiscard]] bool has_position() const;            // any of the three position channels
+  [[nodiscard]] bool has_position() const;  // any of the three position channels
 };
 
 struct Skeleton {

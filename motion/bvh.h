@@ -1,0 +1,41 @@
+// BVH (Biovision hierarchy) files to clips and back.
+//
+// Format: M. Meredith, S. Maddock, Motion capture file formats explained, 2001. What real files do beyond it is read
+// too:
+//  - any channel order and count, 0 to 6 a joint, no channel twice; the rotation channels apply left to right;
+//  - position channels on any joint replace its OFFSET as a whole (an axis without a channel is 0). Where they vary
+//  they
+//    become a translation track; where they stay the same over the clip they become the joint's offset and no track;
+//  - words in any case, names with spaces (runs of white space become one space), equal names, tabs, LF, CR LF and CR,
+//  a
+//    byte order mark, no newline at the end, End Sites anywhere (kept on leaves, where they mean something).
+// One frame is one line. A frame time within 5e-5 of one over a whole number is that rate: 0.0333333 is 30 Hz.
+//
+// Units: a BVH has none. Its lengths are taken as centimetres, its angles are degrees, its Y is up.
+//
+// Bad input throws Error{bad_input} with file and line: a word out of place, a frame count that disagrees with the
+// data, a line with too few or too many numbers, nan, inf, a number beyond 1e9, no channels at all, more than 1000
+// levels of joints, a second ROOT, a small file that would need much memory.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "motion/clip.h"
+
+namespace kinespace {
+
+// `source_name` stands in messages; the clip is named after it, without folder and ending.
+[[nodiscard]] Clip parse_bvh(std::string_view text, const std::string& source_name);
+[[nodiscard]] Clip read_bvh(const std::filesystem::path& path);
+
+// The clip as BVH. Channels are the skeleton's own, more where they could not hold the motion (motion/euler.h,
+// channels_to_write). Angles are continuous from frame to frame, through gimbal lock too; numbers of the motion have 6
+// decimals, which moves no joint of a body by more than 2e-5 cm. A leaf without an end site gets one of length zero, as
+// the format wants; braces and control characters in names become '_'.
+[[nodiscard]] std::string format_bvh(const Clip& clip);
+// The file is whole or not there. Throws Error.
+void write_bvh(const std::filesystem::path& path, const Clip& clip);
+
+}  // namespace kinespace
