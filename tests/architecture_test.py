@@ -1,0 +1,166 @@
+#!/usr/bin/env python3
+"""Holds the sources to the house rules: which folder may include which, and a few habits a compiler does not check.
+
+    architecture_test.py [ROOT]
+
+First every rule is shown to catch a source that breaks it, in a tree made up for that; then ROOT (this checkout) must keep them all.
+"""
+import pathlib
+import re
+import sys
+import tempfile
+
+# The arrows: what each folder may include beside itself. A new folder gets a line here.
+ARROWS = {
+    "base": "",
+    "motion": "base",
+    "storage": "base",
+    "kernels": "base",
+    "fpca": "base motion storage kernels",
+    "synthesis": "base motion storage kernels fpca",
+    "examples": "base motion",
+    "bench": "base motion storage kernels fpca synthesis examples",
+    "cli": "base motion storage kernels fpca synthesis examples bench",
+    "tests": "base motion storage kernels fpca synthesis examples bench cli",
+}
+ARROWS = {folder: set(others.split()) | {folder} for folder, others in ARROWS.items()}
+
+LONGEST_FILE = 500
+# What reads numbers by the locale of the process, which is the user's business and not a file's.
+LOCALE_BOUND = re.compile(r"\b(?:std::)?(?:stod|stof|stold|strtod|strtof|strtold|atof|sscanf|fscanf|setlocale)\s*\(")
+INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
+CATCH_ALL = re.compile(r"catch\s*\(\s*\.\.\.\s*\)\s*\{")
+LEFT_OPEN = re.compile(r"\b(?:TODO|FIXME|XXX|HACK)\b")
+REPORTS = re.compile(r"\bthrow\b|\bstd::current_exception\b|\bstd::rethrow_exception\b|\breport\w*\s*\(")
+
+
+def without_comments(text):
+    return re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.DOTALL)
+
+
+def block(text, open_brace):
+    """The text from `open_brace` to the brace that closes it."""
+    depth = 0
+    for at in range(open_brace, len(text)):
+        depth += {"{": 1, "}": -1}.get(text[at], 0)
+        if depth == 0:
+            return text[open_brace : at + 1]
+    return text[open_brace:]
+
+
+def arrows(root, file, text):
+    folder = file.parts[0]
+    if folder not in ARROWS:
+        yield f"the folder {folder}/ has no arrows in tests/architecture_test.py"
+        return
+    for included in INCLUDE.findall(text):
+        target = included.split("/")[0]
+        if included.endswith(".inc"):
+            continue  # written by the build
+        if "/" not in included or not (root / included).is_file():
+            yield f'"{included}" is not the path of a file from the root of the checkout'
+        elif target not in ARROWS[folder]:
+            yield f"{folder}/ must not include {target}/ ({included})"
+
+
+def length(root, file, text):
+    lines = text.count("\n")
+    if lines > LONGEST_FILE:
+        yield f"{lines} lines, more than {LONGEST_FILE}: there is more than one idea in it"
+
+
+def catch_all(root, file, text):
+    code = without_comments(text)
+    for found in CATCH_ALL.finditer(code):
+        if not REPORTS.search(block(code, found.end() - 1)):
+            yield "a catch (...) that neither rethrows nor reports"
+
+
+def locale(root, file, text):
+    if file.parts[0] == "tests":
+        return  # they set a comma locale on purpose
+    found = LOCALE_BOUND.search(without_comments(text))
+    if found:
+        yield f"{found.group(0)}...) obeys the locale; parse with from_chars"
+
+
+def left_open(root, file, text):
+    found = LEFT_OPEN.search(text)
+    if found:
+        yield f"{found.group(0)} left in"
+
+
+def guarded(root, file, text):
+    if file.suffix == ".h" and "#pragma once" not in text:
+        yield "a header without #pragma once"
+
+
+RULES = [arrows, length, catch_all, locale, left_open, guarded]
+
+
+def findings(root, rules=RULES):
+    """["file: what is wrong"] over all sources under the root's folders; without any source, that is what is wrong."""
+    out, looked_at = [], 0
+    for path in sorted(root.glob("*/**/*")):
+        file = path.relative_to(root)
+        if path.suffix not in (".h", ".cpp", ".cl") or file.parts[0] in ("build", "out"):
+            continue
+        looked_at += 1
+        text = path.read_text(encoding="utf-8")
+        out += [f"{file}: {finding}" for rule in rules for finding in rule(root, file, text)]
+    return out if looked_at else [f"{root}: no sources here"]
+
+
+GOOD = {
+    "base/error.h": "#pragma once\n",
+    "motion/clip.h": '#pragma once\n#include "base/error.h"\n',
+    "motion/clip.cpp": '#include "motion/clip.h"\nvoid f() try { g(); } catch (...) { undo(); throw; }\n',
+    "tests/motion/clip_test.cpp": '#include "motion/clip.h"\n',
+}
+# One breach a rule, and what its finding must say.
+BREACHES = [
+    (arrows, "base/clock.cpp", '#include "motion/clip.h"\n', "base/ must not include motion/"),
+    (arrows, "motion/bad.cpp", '#include "clip.h"\n', "is not the path of a file"),
+    (arrows, "motion/gone.cpp", '#include "motion/gone.h"\n', "is not the path of a file"),
+    (arrows, "codex/new.cpp", "\n", "has no arrows"),
+    (length, "base/long.cpp", "\n" * (LONGEST_FILE + 1), "more than one idea"),
+    (catch_all, "base/mute.cpp", "void f() { try { g(); } catch (...) { /* throw; */ } }\n", "neither rethrows nor reports"),
+    (locale, "motion/parse.cpp", "double x = std::stod(word);\n", "obeys the locale"),
+    (left_open, "base/later.cpp", "// TO" + "DO: finish\n", "left in"),
+    (guarded, "base/twice.h", "int x();\n", "without #pragma once"),
+]
+
+
+def write(root, files):
+    for name, text in files.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def self_test():
+    """[rule that does not work]"""
+    broken = []
+    with tempfile.TemporaryDirectory() as folder:
+        root = pathlib.Path(folder)
+        write(root, GOOD)
+        broken += [f"a good tree is blamed: {finding}" for finding in findings(root)]
+    for rule, name, text, expected in BREACHES:
+        with tempfile.TemporaryDirectory() as folder:
+            root = pathlib.Path(folder)
+            write(root, GOOD | {name: text})
+            found = findings(root, [rule])
+            if len(found) != 1 or expected not in found[0] or not found[0].startswith(name):
+                broken.append(f"{rule.__name__} on {name}: found {found}, expected '{expected}'")
+    return broken
+
+
+def main():
+    root = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parent.parent).resolve()
+    wrong = [f"the rule itself is broken: {b}" for b in self_test()] or findings(root)
+    print("\n".join(wrong) or f"{len(RULES)} rules, each shown to fail on {len(BREACHES)} breaches; the sources keep them all")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
