@@ -1,0 +1,29 @@
+# Turns kernels/x.cl into the C++ string opencl_source::x, so that the library needs no file at run time.
+# cmake -DNAME=x -DINPUT=x.cl -DOUTPUT=x_cl.cpp -P EmbedKernels.cmake
+if(CMAKE_SCRIPT_MODE_FILE)
+  file(READ "${INPUT}" source)
+  file(WRITE "${OUTPUT}" "// Made from kernels/${NAME}.cl.
+namespace kinespace::opencl_source {
+extern const char* const ${NAME};
+const char* const ${NAME} = R\"opencl(${source})opencl\";
+}  // namespace kinespace::opencl_source
+")
+  return()
+endif()
+
+# kinespace_embed_kernels(VARIABLE x ...): the list of generated sources.
+set(KINESPACE_EMBED_SCRIPT "${CMAKE_CURRENT_LIST_FILE}")
+function(kinespace_embed_kernels variable)
+  set(outputs "")
+  foreach(name ${ARGN})
+    set(input "${CMAKE_CURRENT_SOURCE_DIR}/${name}.cl")
+    set(output "${CMAKE_CURRENT_BINARY_DIR}/${name}_cl.cpp")
+    add_custom_command(
+      OUTPUT "${output}"
+      COMMAND "${CMAKE_COMMAND}" -DNAME=${name} "-DINPUT=${input}" "-DOUTPUT=${output}" -P "${KINESPACE_EMBED_SCRIPT}"
+      DEPENDS "${input}" "${KINESPACE_EMBED_SCRIPT}"
+      VERBATIM)
+    list(APPEND outputs "${output}")
+  endforeach()
+  set(${variable} "${outputs}" PARENT_SCOPE)
+endfunction()

@@ -1,0 +1,161 @@
+#include "kernels/device.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <charconv>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include <cblas.h>
+
+#include "base/error.h"
+#include "kernels/opencl.h"
+
+namespace kinespace {
+namespace {
+
+// Where "auto" leaves the processor: floating-point operations of one call. Measured on two AVX-512 cores with
+// PoCL 3.1, program already built; the bench `kernels` prints the crossing on another machine. `processor` is for
+// OpenCL devices that are processors (PoCL), `gpu` for the others, where the bound is the cost of moving the data.
+// Infinity: never.
+struct Threshold {
+  KernelFamily family;
+  double processor;
+  double gpu;
+};
+constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr std::array kThresholds{
+    Threshold{KernelFamily::keyframe_distances, kNever, 1e9}, Threshold{KernelFamily::dtw, 2e9, 2e9},
+    Threshold{KernelFamily::covariance, kNever, 1e10},        Threshold{KernelFamily::projection, kNever, 1e10},
+    Threshold{KernelFamily::local_linear, kNever, 1e10},
+};
+// Below this nothing profits, so that a small call under "auto" need not even look for devices.
+constexpr double kSmallest = 1e9;
+
+std::optional<std::size_t> device_number(const std::string& choice) {
+  const std::string prefix = "opencl:";
+  if (!choice.starts_with(prefix)) return std::nullopt;
+  std::size_t number = 0;
+  const char* end = choice.data() + choice.size();
+  const auto [stop, error] = std::from_chars(choice.data() + prefix.size(), end, number);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  return number;
+}
+
+std::size_t best_of(const std::vector<cl::Device>& devices) {
+  const auto gpu = std::find_if(devices.begin(), devices.end(), [](const cl::Device& device) {
+    return (device.getInfo<CL_DEVICE_TYPE>() & CL_DEVICE_TYPE_GPU) != 0;
+  });
+  return gpu == devices.end() ? 0 : static_cast<std::size_t>(gpu - devices.begin());
+}
+
+[[noreturn]] void no_such_device(const std::string& choice, std::size_t count, const std::string& reason) {
+  throw Error(ErrorKind::machine, {.found = reason.empty() ? std::to_string(count) + " OpenCL devices" : reason,
+                                   .expected = "the device '" + choice + "'",
+                                   .remedy = "see `kinespace devices`, or choose auto or cpu"});
+}
+
+}  // namespace
+
+struct Compute::State {
+  std::string choice = "cpu";
+  std::once_flag opening;
+  std::unique_ptr<OpenClDevice> device;
+  std::string reason;  // why "auto" found no device
+  std::atomic<bool> opened = false;
+
+  // Opens the device that the choice names; throws Error{machine} when it is not there.
+  void open_named() {
+    const auto devices = find_opencl_devices(reason);
+    const std::size_t chosen = device_number(choice).value_or(best_of(devices));
+    if (chosen >= devices.size()) no_such_device(choice, devices.size(), reason);
+    device = std::make_unique<OpenClDevice>(devices[chosen]);
+    opened = true;
+  }
+
+  // Opens the best device once, if there is one; a driver that fails is a reason for the processor.
+  void open_best() {
+    std::call_once(opening, [this] {
+      try {
+        const auto devices = find_opencl_devices(reason);
+        if (!devices.empty()) device = std::make_unique<OpenClDevice>(devices[best_of(devices)]);
+      } catch (const Error& error) {
+        reason = error.what();
+      }
+      opened = true;
+    });
+  }
+};
+
+DeviceList list_opencl_devices() {
+  DeviceList list;
+  for (const auto& device : find_opencl_devices(list.reason)) list.devices.push_back(describe_opencl_device(device));
+  return list;
+}
+
+std::vector<DeviceInfo> list_devices() {
+  return list_opencl_devices().devices;
+}
+
+Compute::Compute() : state_(std::make_shared<State>()) {}
+
+Compute::Compute(std::shared_ptr<State> state, KernelVariant variant) : state_(std::move(state)), variant_(variant) {}
+
+Compute Compute::open(const std::string& choice) {
+  const bool named = choice == "opencl" || device_number(choice).has_value();
+  if (!named && choice != "auto" && choice != "cpu") {
+    throw Error(ErrorKind::usage,
+                {.found = "device '" + choice + "'", .expected = "auto, cpu, opencl or opencl:N with N from 0"});
+  }
+  auto state = std::make_shared<State>();
+  state->choice = choice;
+  if (named) state->open_named();
+  return Compute(std::move(state), KernelVariant::by_device);
+}
+
+const std::string& Compute::choice() const {
+  return state_->choice;
+}
+
+std::string Compute::describe() const {
+  const std::string processor =
+      "cpu (" + std::to_string(std::max(1U, std::thread::hardware_concurrency())) + " threads, float and double)";
+  if (state_->choice == "cpu") return processor;
+  if (!state_->opened) return processor + "; OpenCL not needed so far";
+  if (state_->device == nullptr) return processor + "; " + state_->reason;
+  const auto& info = state_->device->info();
+  const std::string device = info.name + " through " + info.platform + " (" + info.type + ", float" +
+                             (info.fp64 ? " and double" : ", no double") + ")";
+  return state_->choice == "auto" ? processor + "; " + device + " for large kernels" : device;
+}
+
+Compute Compute::with_variant(KernelVariant variant) const {
+  return Compute(state_, variant);
+}
+
+OpenClDevice* Compute::device_for(KernelFamily family, double flops) const {
+  if (state_->choice == "cpu") return nullptr;
+  if (state_->choice != "auto") return state_->device.get();
+  if (flops < kSmallest) return nullptr;
+  const auto row = std::find_if(kThresholds.begin(), kThresholds.end(),
+                                [&](const Threshold& threshold) { return threshold.family == family; });
+  if (flops < std::min(row->processor, row->gpu)) return nullptr;
+  state_->open_best();
+  const auto* device = state_->device.get();
+  if (device == nullptr || flops < (device->is_processor() ? row->processor : row->gpu)) return nullptr;
+  return state_->device.get();
+}
+
+bool Compute::uses_lanes(const OpenClDevice& device) const {
+  return variant_ == KernelVariant::by_device ? device.is_processor() : variant_ == KernelVariant::lanes;
+}
+
+void use_single_threaded_blas() {
+  static const bool once = (openblas_set_num_threads(1), true);
+  static_cast<void>(once);
+}
+
+}  // namespace kinespace

@@ -1,0 +1,37 @@
+// What a kernel is tested and timed by: one descriptor drives the equivalence test (kernel against plain reference) and
+// the bench, so that a kernel cannot be in one and not in the other.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "kernels/device.h"
+
+namespace kinespace {
+
+struct KernelDescriptor {
+  using Sizes = std::vector<int>;  // what they mean is the kernel's own, in the order of `size_names`
+
+  struct Comparison {
+    double error = 0;  // largest |kernel - reference| over the scale of the reference
+    double kernel_seconds = 0;
+    double reference_seconds = 0;
+  };
+
+  std::string name;
+  std::vector<std::string> size_names;
+  std::vector<Sizes> test_sizes;  // with 0, 1, the group's size and its neighbours, and odd ones
+  Sizes bench_sizes;
+  double tolerance = 0;  // on Comparison::error
+  std::function<double(const Sizes&)> flops;
+  std::function<double(const Sizes&)> bytes;  // that must move at least
+  // Makes data from the seed, computes both and compares.
+  std::function<Comparison(const Sizes&, const Compute&, std::uint32_t seed)> compare;
+};
+
+// Every kernel.
+[[nodiscard]] std::vector<KernelDescriptor> kernel_descriptors();
+
+}  // namespace kinespace
