@@ -1,0 +1,78 @@
+// A clip in a motion space: from its curves to the vectors of its sequences, and back at any level of detail.
+//
+// Sequences are independent in the space; on the way back they are joined so that nothing jumps at a cut: neighbours meet at
+// the mean of their two ends, and where the change of slope at the cut is larger than what the sequences show inside, the
+// excess is taken out, both by corrections that fade within `blend` of a sequence.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "fpca/curves.h"
+#include "fpca/motion_space.h"
+#include "fpca/sequences.h"
+#include "fpca/warp.h"
+
+namespace kinespace {
+
+struct EncodedSequence {
+  int first = 0;  // frames of the clip, both included
+  int last = 0;
+  Warp warp;
+  Eigen::Vector3f travel = Eigen::Vector3f::Zero();  // metres from the first to the last frame, heading 0 frame of the clip
+  ScoreMatrix scores;                                // K x C
+};
+
+struct EncodedRun {
+  Eigen::Vector3f start = Eigen::Vector3f::Zero();  // metres: the root at the run's first frame, in the clip's frame
+  std::vector<EncodedSequence> sequences;           // neighbours share a frame
+};
+
+// Everything of a clip but its skeleton.
+struct EncodedClip {
+  std::string name;
+  double rate_hz = 0;
+  int frames = 0;
+  Placement placement;
+  std::vector<SideTrack> side_tracks;
+  std::vector<EncodedRun> runs;
+
+  [[nodiscard]] int sequence_count() const;
+};
+
+struct JoinOptions {
+  double blend = 0.15;        // of a sequence's length, (0, 0.5]
+  double free_change = 0.35;  // how much of the typical change of slope inside (rms) may stay at a cut; >= 0
+};
+
+// The curves of a run as splines, ready to be sampled sequence by sequence.
+class RunSampler {
+ public:
+  // `values`: all frames of the clip; the run is cut out.
+  RunSampler(const SampleMatrix& values, const Run& run, double rate_hz);
+  // T x C at the T points of the warped sequence time: velocity in m/s, quaternions.
+  [[nodiscard]] SampleMatrix sample(int first, int last, const Warp& warp, int points) const;
+
+ private:
+  UniformSpline spline_;
+  int start_;
+  double rate_hz_;
+};
+
+// `curves` must be on the space's side (MotionSpace::apply_references). One warp a sequence, in order; none: identities.
+[[nodiscard]] EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
+                                 const std::vector<Warp>& warps = {});
+
+// With the first n functions (all when n < 0).
+[[nodiscard]] ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n = -1, const JoinOptions& join = {});
+
+// A clip outside the library, into the space: curves, sides, cuts, vectors. Throws Error{bad_input} for another skeleton.
+[[nodiscard]] EncodedClip encode_clip(const MotionSpace& space, const Clip& clip, const SequenceOptions& sequences = {});
+
+// Bounds the root mean square joint position error, in cm, that leaving out all but n functions makes in a sequence, from the
+// scores alone: rms |p~ - p| <= rms root error + sum over the joints above of 2 sqrt(2) rms |q~ - q| times the distance below
+// them that they swing. Joining at cuts is not in it. Largest over joints.
+[[nodiscard]] double truncation_bound_cm(const MotionSpace& space, const Skeleton& skeleton, const EncodedClip& clip, int n);
+
+}  // namespace kinespace

@@ -1,0 +1,113 @@
+// The motion space (yoo2019, sections 4 and 5.3): orthonormal functions of one sequence's time, found by functional PCA over
+// the curves of many sequences, and the vector of a sequence in it.
+//
+// A sequence is sampled at T points over [0, 1] of its (warped) time: C = 3 + 4 J curves, the root's velocity in m/s and the
+// joints' quaternions. Curve c of group g is
+//
+//   f_c(s) = mu_g(s) + sum_k  x_kc phi_gk(s),      x_kc = integral (f_c - mu_g) phi_gk ds                 (eq. 1, 10)
+//
+// The vector of a sequence is all x_kc, function by function, most important first: its first n rows are the sequence at a
+// coarser level of detail, and by Parseval the L2 error of leaving the rest out is the norm of the rest.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "fpca/curve_moments.h"
+#include "fpca/curves.h"
+#include "fpca/functional_pca.h"
+#include "fpca/uniform_spline.h"
+#include "kernels/device.h"
+
+namespace kinespace {
+
+// Which curves share functions (yoo2019, table 2).
+enum class Grouping : std::uint8_t {
+  all_together,         // one set of functions for all curves: the fewest functions over all, the default
+  per_component,        // seven sets: velocity x y z, quaternion w x y z
+  per_joint_component,  // a set for every curve: the lowest error for a count, by far the most functions
+};
+
+struct MotionSpaceOptions {
+  Grouping grouping = Grouping::all_together;
+  int points = 0;                  // T, 4 .. 1024; 0: longest_s times the highest rate, plus 12, at least 48
+  double variance_share = 0.9999;  // of the curves' variance that the functions cover, in (0, 1] ...
+  std::optional<int> functions;    // ... or a count, 1 .. T
+  bool smooth = false;             // smooth mean and covariance and take the noise off (PACE); clean motion needs none
+
+  // Throws Error{usage} naming field, value and legal range.
+  void validate() const;
+};
+
+// [function][curve]: row k holds x_kc. Groups with fewer functions have zeros in the rows they lack.
+using ScoreMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// The functions of one group of curves.
+struct FunctionGroup {
+  Eigen::VectorXd mean;         // T
+  Eigen::MatrixXd functions;    // T x K, orthonormal under the trapezoid rule
+  Eigen::VectorXd eigenvalues;  // K, descending
+  double variance = 0;          // of all T directions
+};
+
+class MotionSpace {
+ public:
+  // No functions yet; see fit. `references`: 4 x J, the quaternion that each joint's curves lie on the side of.
+  MotionSpace(Skeleton skeleton, MotionSpaceOptions options, int points);
+
+  // Which sign each joint's quaternions get, over the whole library: the side of its mean orientation (the main axis of
+  // sum q q', markley 2007, which knows no signs).
+  void set_references(const Eigen::Matrix4Xd& references);
+  [[nodiscard]] const Eigen::Matrix4Xd& references() const { return references_; }
+  // Turns the quaternion curves of a clip to that side: the root by its first frame, other joints by their sum.
+  void apply_references(SampleMatrix& values) const;
+
+  // One accumulator for each group, to be filled by accumulate.
+  [[nodiscard]] std::vector<CurveMoments> empty_moments() const;
+  // Adds the curves of sequences: `samples` are T x C blocks.
+  void accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments) const;
+  // Finds the functions. The moments stay with the space, so that it can be extended.
+  void fit(std::vector<CurveMoments> moments, const Compute& compute = {});
+
+  // T x C samples to K x C scores and back, with the first n functions (all when n < 0 or too large).
+  [[nodiscard]] ScoreMatrix scores(const SampleMatrix& samples) const;
+  [[nodiscard]] SampleMatrix samples(const ScoreMatrix& scores, int n = -1) const;
+  // Scores in this space of what the scores were in another one of the same grid and curves (after it was extended).
+  [[nodiscard]] ScoreMatrix transfer(const ScoreMatrix& scores, const MotionSpace& from) const;
+
+  // Root mean square over the sequence's time of the error in each curve when only the first n functions are kept.
+  [[nodiscard]] Eigen::VectorXd truncation_error(const ScoreMatrix& scores, int n) const;
+
+  [[nodiscard]] const Skeleton& skeleton() const { return skeleton_; }
+  [[nodiscard]] const CurveLayout& layout() const { return layout_; }
+  [[nodiscard]] const MotionSpaceOptions& options() const { return options_; }
+  [[nodiscard]] int points() const { return points_; }
+  [[nodiscard]] int curves() const { return layout_.curve_count(); }
+  [[nodiscard]] int functions() const;  // of the largest group: the rows of a score matrix
+  [[nodiscard]] int function_count() const;  // over all groups
+  [[nodiscard]] int group_of(int curve) const;
+  [[nodiscard]] int group_count() const;
+  [[nodiscard]] const std::vector<FunctionGroup>& groups() const { return groups_; }
+  [[nodiscard]] const std::vector<CurveMoments>& moments() const { return moments_; }
+  // Share of all variance that the functions cover.
+  [[nodiscard]] double variance_covered() const;
+
+ private:
+  friend Bytes pack_space(const MotionSpace& space);
+  friend MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& source);
+
+  Skeleton skeleton_;
+  CurveLayout layout_;
+  MotionSpaceOptions options_;
+  int points_;
+  Eigen::VectorXd weights_;  // trapezoid rule over [0, 1]
+  Eigen::Matrix4Xd references_;
+  std::vector<FunctionGroup> groups_;
+  std::vector<CurveMoments> moments_;
+};
+
+}  // namespace kinespace
