@@ -1,0 +1,318 @@
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "base/file.h"
+#include "motion/amc.h"
+#include "motion/euler.h"
+#include "motion/motion_builder.h"
+#include "motion/text.h"
+
+namespace kinespace {
+namespace {
+
+constexpr double usual_rate_hz = 120;
+
+// Where a joint's values stand among all values of a frame, by axis; -1 for what its dofs leave out.
+struct BoneColumns {
+  int joint = 0;
+  std::size_t first = 0;
+  std::array<int, 3> rotation = {-1, -1, -1};
+  std::array<int, 3> position = {-1, -1, -1};
+  bool rotates = false;
+  bool moves = false;
+};
+
+std::vector<BoneColumns> lay_out(const Asf& asf) {
+  std::vector<BoneColumns> out;
+  int column = 0;
+  for (std::size_t j = 0; j < asf.bones.size(); ++j) {
+    BoneColumns columns{.joint = static_cast<int>(j), .first = static_cast<std::size_t>(column)};
+    for (const Channel c : asf.bones[j].dofs) {
+      (is_position(c) ? columns.position : columns.rotation)[static_cast<std::size_t>(axis_of(c))] = column++;
+      (is_position(c) ? columns.moves : columns.rotates) = true;
+    }
+    out.push_back(columns);
+  }
+  return out;
+}
+
+std::size_t dof_count(const Asf& asf) {
+  std::size_t count = 0;
+  for (const auto& bone : asf.bones) count += bone.dofs.size();
+  return count;
+}
+
+// q -> C q C^-1: the vector part turns, the scalar part stays.
+void turn_axes(const Eigen::Quaterniond& c, double* wxyz, int count) {
+  const Eigen::Matrix3d m = c.toRotationMatrix();
+  for (int f = 0; f < count; ++f, wxyz += 4) {
+    const double x = wxyz[1], y = wxyz[2], z = wxyz[3];
+    wxyz[1] = m(0, 0) * x + m(0, 1) * y + m(0, 2) * z;
+    wxyz[2] = m(1, 0) * x + m(1, 1) * y + m(1, 2) * z;
+    wxyz[3] = m(2, 0) * x + m(2, 1) * y + m(2, 2) * z;
+  }
+}
+
+class AmcParser {
+ public:
+  AmcParser(const TextSource& source, const Asf& asf, std::string name)
+      : source_(source),
+        asf_(asf),
+        at_(source.begin()),
+        radians_(asf.radians),
+        layout_(lay_out(asf)),
+        block_(dof_count(asf)),
+        follows_(asf.bones.size() + 1, 0),
+        seen_in_(asf.bones.size(), -1),
+        zeros_(static_cast<std::size_t>(block_.rows()), 0) {
+    for (std::size_t j = 0; j < asf.bones.size(); ++j) {
+      joint_of_.emplace(asf.skeleton.joints[j].name, static_cast<int>(j));
+      if (!asf.bones[j].dofs.empty()) ++wanted_;
+    }
+    read_head();
+    const std::int64_t frames = honest_frames();
+    require_honest_size(source, asf.bones.size(), frames);
+    clip_ = make_clip(std::move(name), asf.skeleton, rate_hz_, static_cast<int>(frames));
+    for (const BoneColumns& columns : layout_) {
+      if (columns.moves) translations_.emplace_back(columns.joint, clip_.frames);
+    }
+  }
+
+  Clip parse() && {
+    for (int frame = 0; next_line(); ++frame) {
+      read_frame(frame);
+      const int row = frame % block_.rows();
+      if (row + 1 == block_.rows() || frame + 1 == clip_.frames) store(frame - row, row + 1);
+    }
+    for (auto& translation : translations_) std::move(translation).finish(clip_);
+    return std::move(clip_);
+  }
+
+ private:
+  // Goes to the next line that is neither empty nor a comment nor a keyword; false at the end.
+  bool next_line() {
+    for (;;) {
+      while (at_ != source_.end() && is_space(*at_)) ++at_;
+      if (at_ == source_.end()) return false;
+      if (*at_ != '#' && *at_ != ':') return true;
+      if (*at_ == ':') keyword();
+      while (at_ != source_.end() && !is_line_end(*at_)) ++at_;
+    }
+  }
+
+  void keyword() {
+    const auto word = word_at(at_, source_.end());
+    if (same_word(word, ":radians")) radians_ = true;
+    if (same_word(word, ":degrees")) radians_ = false;
+    if (!same_word(word, ":samples-per-second")) return;
+    const char* value = word.data() + word.size();
+    while (value != source_.end() && is_blank(*value)) ++value;
+    const char* const stop = scan_number(value, source_.end(), rate_hz_);
+    if (stop == nullptr || (stop != source_.end() && !is_space(*stop)) || !(rate_hz_ >= 1e-6 && rate_hz_ <= 1e6)) {
+      source_.fail_at_word(value, "a rate between 1e-6 and 1e6 samples a second");
+    }
+  }
+
+  void read_head() {
+    if (!next_line()) source_.fail(at_, "no frame", "at least one frame", "check that this is an AMC file");
+  }
+
+  // The number of frames that the rest of the file can hold, from the lines that have only digits.
+  [[nodiscard]] std::int64_t honest_frames() const {
+    std::int64_t frames = 0;
+    bool line_start = true;
+    const char* const end = source_.end();
+    for (const char* p = at_; p != end;) {
+      if (is_line_end(*p)) {
+        line_start = true;
+        ++p;
+      } else if (!line_start) {
+        p = std::find_if(p, end, is_line_end);
+      } else if (is_blank(*p)) {
+        ++p;
+      } else {
+        line_start = false;
+        while (p != end && is_digit(*p)) ++p;
+        const char* rest = p;
+        while (rest != end && is_blank(*rest)) ++rest;
+        if (p != at_ && is_digit(p[-1]) && (rest == end || is_line_end(*rest))) ++frames;
+      }
+    }
+    std::size_t least =
+        2;  // bytes of the shortest frame: its number, and for each bone the name, the values, a line end
+    for (std::size_t j = 0; j < asf_.bones.size(); ++j) {
+      if (!asf_.bones[j].dofs.empty()) least += asf_.skeleton.joints[j].name.size() + 2 * asf_.bones[j].dofs.size() + 1;
+    }
+    const auto possible = static_cast<std::int64_t>(source_.size() / least + 1);
+    return std::clamp<std::int64_t>(frames, 1, std::min<std::int64_t>(possible, std::numeric_limits<int>::max()));
+  }
+
+  void read_frame(int frame) {
+    frame_number(frame);
+    int previous = 0;  // 0: the line of the frame number; else the joint of the line before, plus one
+    std::size_t found = 0;
+    while (next_line() && !at_frame_number()) {
+      const int joint = joint_at(previous);
+      if (std::exchange(seen_in_[static_cast<std::size_t>(joint)], frame) == frame) {
+        source_.fail_at_word(at_, "each bone once a frame");
+      }
+      read_values(joint, frame % block_.rows());
+      if (!asf_.bones[static_cast<std::size_t>(joint)].dofs.empty()) ++found;
+      previous = joint + 1;
+    }
+    if (found < wanted_) fail_missing(frame);
+  }
+
+  // A frame's number stands alone; a bone's name may start with a digit.
+  [[nodiscard]] bool at_frame_number() const {
+    return is_digit(*at_) && std::ranges::all_of(word_at(at_, source_.end()), is_digit);
+  }
+
+  void frame_number(int frame) {
+    std::int64_t number = 0;
+    const auto word = word_at(at_, source_.end());
+    const auto [stop, code] = std::from_chars(word.data(), word.data() + word.size(), number);
+    const char* rest = stop;
+    while (rest != source_.end() && is_blank(*rest)) ++rest;
+    if (code != std::errc() || stop != word.data() + word.size() || (rest != source_.end() && !is_line_end(*rest))) {
+      source_.fail_at_word(at_, "a frame number on a line of its own");
+    }
+    if (frame > 0 && number != number_ + 1) {
+      source_.fail_at_word(at_, "frame number " + std::to_string(number_ + 1), "the file has lost frames");
+    }
+    number_ = number;
+    at_ = rest;
+  }
+
+  // The joint named at the start of the line. Files list bones in the same order in every frame: try that first.
+  int joint_at(int previous) {
+    int& guess = follows_[static_cast<std::size_t>(previous)];
+    const std::string& name = asf_.skeleton.joints[static_cast<std::size_t>(guess)].name;
+    const auto left = static_cast<std::size_t>(source_.end() - at_);
+    if (left > name.size() && std::string_view(at_, name.size()) == name && is_space(at_[name.size()])) return guess;
+    const auto word = word_at(at_, source_.end());
+    const auto found = joint_of_.find(word);
+    if (found == joint_of_.end()) {
+      source_.fail_at_word(at_, "a bone of the ASF file", "check that the ASF file belongs to this motion");
+    }
+    return guess = found->second;
+  }
+
+  void read_values(int joint, int row) {
+    const char* const end = source_.end();
+    const Joint& named = asf_.skeleton.joints[static_cast<std::size_t>(joint)];
+    const std::size_t count = asf_.bones[static_cast<std::size_t>(joint)].dofs.size();
+    const char* at = at_ + named.name.size();
+    double* out = block_.data(layout_[static_cast<std::size_t>(joint)].first) + row;
+    for (std::size_t i = 0; i < count; ++i, out += block_.rows()) {
+      while (at != end && is_blank(*at)) ++at;
+      const char* const next = scan_number(at, end, *out);
+      if (next == nullptr || !(next == end || is_space(*next)) || !(std::abs(*out) <= largest_number)) [[unlikely]] {
+        fail_in_values(at, named.name, i, count);
+      }
+      at = next;
+    }
+    while (at != end && is_blank(*at)) ++at;
+    if (at != end && !is_line_end(*at)) fail_in_values(at, named.name, count + 1, count);
+    at_ = at;
+  }
+
+  [[noreturn]] void fail_in_values(const char* at, const std::string& name, std::size_t found,
+                                   std::size_t wanted) const {
+    const bool short_line = at == source_.end() || is_line_end(*at);
+    if (!short_line && found <= wanted) source_.fail_at_word(at, "a finite number between -1e9 and 1e9");
+    source_.fail(at,
+                 short_line ? std::to_string(found) + " values of bone \"" + name + "\""
+                            : "more than " + std::to_string(wanted) + " values of bone \"" + name + "\"",
+                 std::to_string(wanted) + ", one for each dof of the ASF file",
+                 at == source_.end() ? "the file is cut short" : "");
+  }
+
+  [[noreturn]] void fail_missing(int frame) const {
+    std::size_t j = 0;
+    while (asf_.bones[j].dofs.empty() || seen_in_[j] == frame) ++j;
+    source_.fail(at_, "no values of bone \"" + asf_.skeleton.joints[j].name + "\" in frame " + std::to_string(number_),
+                 "all bones with dofs in every frame", at_ == source_.end() ? "the file is cut short" : "");
+  }
+
+  const double* column(int index) const {
+    return index < 0 ? zeros_.data() : block_.data(static_cast<std::size_t>(index));
+  }
+
+  void store(int first, int count) {
+    auto translation = translations_.begin();
+    for (const BoneColumns& columns : layout_) {
+      if (columns.rotates) store_rotations(columns, first, count);
+      if (columns.moves) store_translations(columns, *translation++, count);
+    }
+  }
+
+  void store_rotations(const BoneColumns& columns, int first, int count) {
+    const Asf::Bone& bone = asf_.bones[static_cast<std::size_t>(columns.joint)];
+    const EulerOrder order{.axes = columns.joint == 0 ? asf_.root_axes : std::array<int, 3>{2, 1, 0}};
+    std::array<const double*, 3> angles{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const int index = columns.rotation[static_cast<std::size_t>(order.axes[i])];
+      angles[i] = column(index);
+      if (index < 0 || !radians_) continue;
+      double* values = block_.data(static_cast<std::size_t>(index));
+      for (int f = 0; f < count; ++f) values[f] *= 180 / std::numbers::pi;
+    }
+    double* out = clip_.rotation_track(columns.joint).data() + static_cast<std::size_t>(first) * 4;
+    quaternions_from_euler(order, angles[0], angles[1], angles[2], count, out);
+    if (bone.axis.vec() != Eigen::Vector3d::Zero()) turn_axes(bone.axis, out, count);
+  }
+
+  // The root's values are where it is, with the rest position for an axis that has none; a bone's move it from its
+  // rest.
+  void store_translations(const BoneColumns& columns, TranslationBuilder& translation, int count) {
+    const Eigen::Vector3d& rest = asf_.skeleton.joints[static_cast<std::size_t>(columns.joint)].offset;
+    Eigen::Vector3d base = rest;
+    for (int axis = 0; axis < 3 && columns.joint == 0; ++axis) {
+      if (columns.position[static_cast<std::size_t>(axis)] >= 0) base[axis] = 0;
+    }
+    const Eigen::Matrix3d turn =
+        asf_.bones[static_cast<std::size_t>(columns.joint)].axis.toRotationMatrix() * asf_.cm_per_unit;
+    const double* const x = column(columns.position[0]);
+    const double* const y = column(columns.position[1]);
+    const double* const z = column(columns.position[2]);
+    for (int f = 0; f < count; ++f) translation.append(base + turn * Eigen::Vector3d(x[f], y[f], z[f]));
+  }
+
+  const TextSource& source_;
+  const Asf& asf_;
+  const char* at_;
+  bool radians_;
+  double rate_hz_ = usual_rate_hz;
+  std::vector<BoneColumns> layout_;  // by joint
+  ColumnBlock block_;
+  std::vector<int> follows_;
+  std::vector<int> seen_in_;  // by joint: the last frame that had it
+  std::vector<double> zeros_;
+  std::unordered_map<std::string_view, int> joint_of_;
+  std::size_t wanted_ = 0;
+  std::int64_t number_ = 0;
+  Clip clip_;
+  std::vector<TranslationBuilder> translations_;
+};
+
+}  // namespace
+
+Clip parse_amc(std::string_view text, const Asf& asf, const std::string& source_name) {
+  const TextSource source(text, source_name);
+  return AmcParser(source, asf, std::filesystem::path(source_name).stem().string()).parse();
+}
+
+Clip read_amc(const std::filesystem::path& amc, const std::filesystem::path& asf) {
+  const Asf skeleton = read_asf(asf);
+  const MappedFile file(amc);
+  return parse_amc(file.text(), skeleton, amc.string());
+}
+
+}  // namespace kinespace

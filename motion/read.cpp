@@ -1,0 +1,76 @@
+#include "motion/read.h"
+
+#include <algorithm>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "base/error.h"
+#include "motion/amc.h"
+#include "motion/bvh.h"
+#include "motion/gltf.h"
+#include "motion/text.h"
+
+namespace kinespace {
+namespace {
+
+bool has_ending(const std::filesystem::path& path, std::string_view ending) {
+  return same_word(path.extension().string(), ending);
+}
+
+std::vector<std::filesystem::path> skeleton_files(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> out;
+  std::error_code code;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, code)) {
+    if (has_ending(entry.path(), ".asf")) out.push_back(entry.path());
+  }
+  return out;
+}
+
+std::filesystem::path skeleton_of(const std::filesystem::path& amc) {
+  const auto candidates = skeleton_files(amc.has_parent_path() ? amc.parent_path() : ".");
+  const std::string name = amc.stem().string();
+  const std::filesystem::path* best = nullptr;
+  for (const auto& candidate : candidates) {
+    const std::string stem = candidate.stem().string();
+    if (name.starts_with(stem) && (best == nullptr || stem.size() > best->stem().string().size())) best = &candidate;
+  }
+  if (best != nullptr) return *best;
+  if (candidates.size() == 1) return candidates.front();
+  throw Error(ErrorKind::bad_input, {.file = amc.string(),
+                                     .found = candidates.empty() ? "no .asf file beside it"
+                                                                 : std::to_string(candidates.size()) +
+                                                                       " .asf files beside it, none of its name",
+                                     .expected = "the skeleton of the motion",
+                                     .remedy = "put the .asf file beside it or name it"});
+}
+
+[[noreturn]] void fail_ending(const std::filesystem::path& path, const std::string& expected) {
+  const std::string ending = path.extension().string();
+  throw Error(ErrorKind::bad_input,
+              {.file = path.string(),
+               .found = ending.empty() ? "no ending" : "the ending \"" + ending + "\"",
+               .expected = expected,
+               .remedy = has_ending(path, ".asf") ? "name the .amc file; its .asf is found" : ""});
+}
+
+}  // namespace
+
+Clip read_clip(const std::filesystem::path& path, const std::optional<std::filesystem::path>& asf) {
+  if (has_ending(path, ".bvh")) return read_bvh(path);
+  if (has_ending(path, ".amc")) return read_amc(path, asf ? *asf : skeleton_of(path));
+  fail_ending(path, "a motion file: .bvh or .amc");
+}
+
+void write_clip(const std::filesystem::path& path, const Clip& clip) {
+  if (has_ending(path, ".bvh")) return write_bvh(path, clip);
+  if (has_ending(path, ".amc")) return write_amc(path, clip);
+  if (has_ending(path, ".glb") || has_ending(path, ".gltf")) return write_gltf(path, clip);
+  fail_ending(path, ".bvh, .amc, .glb or .gltf");
+}
+
+bool is_motion_file(const std::filesystem::path& path) {
+  return has_ending(path, ".bvh") || has_ending(path, ".amc");
+}
+
+}  // namespace kinespace
