@@ -30,9 +30,9 @@ class ByteWriter {
   template <typename T>
     requires std::is_arithmetic_v<T>
   void put_array(std::span<const T> values) {
-    const auto raw = std::as_bytes(values);
-    bytes_.insert(bytes_.end(), raw.begin(), raw.end());
+    put_bytes(std::as_bytes(values));
   }
+  void put_bytes(std::span<const std::byte> raw) { bytes_.insert(bytes_.end(), raw.begin(), raw.end()); }
   // A 32-bit length, then the bytes.
   void put_string(std::string_view text) {
     put(static_cast<std::uint32_t>(text.size()));
@@ -61,7 +61,7 @@ class ByteReader {
   template <typename T>
     requires std::is_arithmetic_v<T>
   std::vector<T> get_array(std::uint64_t count) {
-    if (count > remaining() / sizeof(T)) truncated(count * sizeof(T));
+    if (count > remaining() / sizeof(T)) truncated(std::to_string(count) + " times " + std::to_string(sizeof(T)));
     std::vector<T> values(static_cast<std::size_t>(count));
     const auto raw = take(values.size() * sizeof(T));
     if (!raw.empty()) std::memcpy(values.data(), raw.data(), raw.size());
@@ -72,7 +72,7 @@ class ByteReader {
     return {reinterpret_cast<const char*>(raw.data()), raw.size()};
   }
   std::span<const std::byte> take(std::size_t count) {
-    if (count > remaining()) truncated(count);
+    if (count > remaining()) truncated(std::to_string(count));
     const auto out = bytes_.subspan(at_, count);
     at_ += count;
     return out;
@@ -90,8 +90,8 @@ class ByteReader {
   }
 
  private:
-  [[noreturn]] void truncated(std::uint64_t wanted) const {
-    fail(std::to_string(remaining()) + " bytes left", std::to_string(wanted) + " more bytes (cut short or damaged)");
+  [[noreturn]] void truncated(const std::string& wanted) const {
+    fail(std::to_string(remaining()) + " bytes left", wanted + " more bytes (cut short or damaged)");
   }
   std::span<const std::byte> bytes_;
   std::size_t at_ = 0;

@@ -1,0 +1,23 @@
+// Writes the fixtures that are missing: run it by hand for a new version of a format (fixtures/README.md).
+#include <gtest/gtest.h>
+
+#include "base/file.h"
+#include "tests/storage/sample_library.h"
+#include "tests/storage/sample_stream.h"
+
+namespace kinespace {
+namespace {
+
+TEST(Fixtures, DISABLED_write_missing) {
+  const std::filesystem::path folder = KINESPACE_FIXTURES;
+  if (!std::filesystem::exists(folder / "bitstream_v1.ksm")) {
+    write_file_atomically(folder / "bitstream_v1.ksm", std::span<const std::byte>(test::sample_stream()));
+  }
+  if (!std::filesystem::exists(folder / "library_v1.kspace")) {
+    Library library = Library::create(folder / "library_v1.kspace");
+    test::fill_sample(library, 3, 40);
+  }
+}
+
+}  // namespace
+}  // namespace kinespace
