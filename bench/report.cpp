@@ -1,6 +1,7 @@
 #include "bench/report.h"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 namespace kinespace {
 namespace {
@@ -35,6 +36,22 @@ std::span<const Bench> all_benches() {
   return benches;
 }
 #undef KINESPACE_BENCH
+
+std::string to_json(const BenchReport& report) {
+  using Json = nlohmann::ordered_json;
+  Json results = Json::array();
+  for (const BenchResult& result : report.results) {
+    results.push_back({{"name", result.name},
+                       {"data", result.data},
+                       {"value", result.value},
+                       {"unit", result.unit},
+                       {"bar", result.bar ? Json(*result.bar) : Json()},
+                       {"ok", result.ok()}});
+  }
+  const Json object{
+      {"bench", report.bench}, {"device", report.device}, {"threads", report.threads}, {"results", results}};
+  return object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
 
 std::string to_markdown(const BenchReport& report) {
   std::string out = fmt::format("## {}\n\n{}; {} thread{}.\n\n", report.bench, report.device, report.threads,

@@ -34,6 +34,10 @@ struct BenchOptions {
   std::string device = "auto";
 };
 
+// The report as one JSON object: bench, device, threads, results: [{name, data, value, unit, bar, ok}], bar null where
+// there is none.
+[[nodiscard]] std::string to_json(const BenchReport& report);
+
 // The report as a markdown table: a heading, what computed it, one row a result. What docs/results.md is made of.
 [[nodiscard]] std::string to_markdown(const BenchReport& report);
 

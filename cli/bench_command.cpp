@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
-#include "cli/json_output.h"
 
 namespace kinespace::cli {
 namespace {
@@ -20,20 +19,8 @@ struct BenchCommandOptions {
   std::string device = "auto";
   bool json = false;
   bool markdown = false;
+  bool list = false;
 };
-
-Json to_json(const BenchReport& report) {
-  Json results = Json::array();
-  for (const BenchResult& result : report.results) {
-    results.push_back({{"name", result.name},
-                       {"data", result.data},
-                       {"value", result.value},
-                       {"unit", result.unit},
-                       {"bar", result.bar ? Json(*result.bar) : Json()},
-                       {"ok", result.ok()}});
-  }
-  return {{"bench", report.bench}, {"device", report.device}, {"threads", report.threads}, {"results", results}};
-}
 
 void print_rows(const BenchReport& report) {
   fmt::print("{}: {}; threads: {}\n", report.bench, report.device, report.threads);
@@ -48,13 +35,18 @@ void print_rows(const BenchReport& report) {
 }
 
 void run_bench(const BenchCommandOptions& options) {
+  if (options.list) {
+    for (const Bench& bench : all_benches()) fmt::print("{}\n", bench.name);
+    return;
+  }
+  if (options.name.empty()) throw CLI::RequiredError("NAME");
   BenchOptions bench_options{.data = options.data, .device = options.device};
   if (!options.golden.empty()) bench_options.golden = options.golden;
   for (const Bench& bench : all_benches()) {
     if (bench.name != options.name) continue;
     const BenchReport report = bench.run(bench_options);
     if (options.json) {
-      print_json(to_json(report));
+      fmt::print("{}", to_json(report));
     } else if (options.markdown) {
       fmt::print("{}", to_markdown(report));
     } else {
@@ -72,7 +64,8 @@ void add_bench(CLI::App& app, Session& /*session*/) {
       app.add_subcommand("bench", "Measure this build on your data, each number beside the bar it should reach");
   const auto options = std::make_shared<BenchCommandOptions>();
   options->data = "build/data";
-  command->add_option("NAME", options->name, "Which bench")->required()->check(CLI::IsMember(names));
+  command->add_option("NAME", options->name, "Which bench")->check(CLI::IsMember(names));
+  command->add_flag("--list", options->list, "Print the names of the benches");
   command->add_option("--data", options->data, "Folder with cmu/, bandai1/, bandai2/")
       ->envname("KINESPACE_DATA")
       ->capture_default_str();

@@ -42,7 +42,7 @@ void convert(const ConvertOptions& options, Session& session) {
                 {"rate_hz", clip.rate_hz},
                 {"joints", clip.skeleton.joint_count()}});
   } else {
-    session.note(fmt::format("{}: {} frames at {:.6g} Hz, {} joints", options.output.string(), clip.frames,
+    session.note(fmt::format("wrote {}: {} frames at {:.6g} Hz, {} joints", options.output.string(), clip.frames,
                              clip.rate_hz, clip.skeleton.joint_count()));
   }
 }

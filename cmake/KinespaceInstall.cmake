@@ -1,1 +1,57 @@
+# What a user installs: the command, the libraries with their headers, find_package(kinespace), pkg-config and a .deb.
 include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# The sample motions serve the demo and the tests only.
+set(installed_modules ${KINESPACE_MODULES})
+list(REMOVE_ITEM installed_modules samples)
+
+# kinespace::kinespace: everything.
+add_library(kinespace_all INTERFACE)
+add_library(kinespace::kinespace ALIAS kinespace_all)
+set_target_properties(kinespace_all PROPERTIES EXPORT_NAME kinespace)
+set_target_properties(kinespace_alglib PROPERTIES EXPORT_NAME alglib)
+
+set(installed_targets kinespace_all kinespace_alglib)
+foreach(module IN LISTS installed_modules)
+  target_link_libraries(kinespace_all INTERFACE kinespace_${module})
+  list(APPEND installed_targets kinespace_${module})
+  get_target_property(folder kinespace_${module} SOURCE_DIR)
+  install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/kinespace FILES_MATCHING PATTERN "*.h")
+endforeach()
+install(TARGETS kinespace_command RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+install(TARGETS ${installed_targets} EXPORT kinespaceTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+
+set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/kinespace)
+install(EXPORT kinespaceTargets NAMESPACE kinespace:: DESTINATION ${package_dir})
+configure_package_config_file(cmake/kinespaceConfig.cmake.in kinespaceConfig.cmake INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file(kinespaceConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/kinespaceConfig.cmake ${CMAKE_CURRENT_BINARY_DIR}/kinespaceConfigVersion.cmake
+        DESTINATION ${package_dir})
+
+# A static library stands before those it uses, so the arrows' order is turned round.
+set(pkgconfig_libs ${installed_modules})
+list(REVERSE pkgconfig_libs)
+list(TRANSFORM pkgconfig_libs PREPEND -lkinespace_)
+list(JOIN pkgconfig_libs " " pkgconfig_libs)
+file(RELATIVE_PATH pkgconfig_up /${CMAKE_INSTALL_LIBDIR} /)
+configure_file(cmake/kinespace.pc.in kinespace.pc @ONLY)
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/kinespace.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+install(FILES README.md CHANGELOG.md CONTRIBUTING.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_PACKAGE_CONTACT "The kinespace authors <kinespace@authors.invalid>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_DESCRIPTION}")
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS pocl-opencl-icd)
+# For programs built on the libraries: what kinespaceConfig.cmake and kinespace.pc look for.
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libeigen3-dev, libarmadillo-dev, libopenblas-dev, libalglib-dev, ocl-icd-opencl-dev, \
+opencl-clhpp-headers, libfmt-dev, libtbb-dev, libxxhash-dev, libzstd-dev, libsqlite3-dev, nlohmann-json3-dev, pkg-config")
+include(CPack)

@@ -1,0 +1,137 @@
+// What stands around the command: odd file names, a comma locale, a terminal or a log, signals.
+#include <clocale>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/progress_bar.h"
+#include "cli/session.h"
+#include "motion/error_measures.h"
+#include "motion/read.h"
+#include "tests/cli/run_command.h"
+#include "tests/support/data.h"
+
+namespace kinespace::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+TEST(Surroundings, file_names_may_hold_spaces_quotes_colons_and_more) {
+  for (const char* name : {"two words", "it's \"quoted\"", "C: drive", "info", "[1,2]", "100%{}", "ü ñ",
+                           "semi;colon & $HOME `x`", "back\\slash", "=", "tab\there", "caf\xe9"}) {
+    SCOPED_TRACE(name);
+    const TemporaryFolder folder;
+    const auto input = folder.path() / name / (std::string(name) + ".bvh");
+    std::filesystem::create_directory(folder.path() / name);
+    write_text(input, walking_bvh(5, 1));
+    const auto output = folder.path() / (std::string(name) + " copy.bvh");
+    const CommandResult converted = run_command({"convert", input.string(), output.string(), "--json"});
+    ASSERT_EQ(converted.code, 0) << converted.err;
+    EXPECT_TRUE(nlohmann::json::accept(converted.out)) << converted.out;
+    EXPECT_TRUE(std::filesystem::exists(output));
+    EXPECT_EQ(run_command({"compare", input.string(), output.string()}).code, 0);
+  }
+}
+
+TEST(Surroundings, a_name_that_looks_like_an_option_or_a_subcommand_is_still_a_name) {
+  const TemporaryFolder folder;
+  write_text(folder / "--json.bvh", walking_bvh(5, 1));
+  std::filesystem::copy_file(folder / "--json.bvh", folder / "info");
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  const CommandResult dashed = run_command({"info", "--", "--json.bvh"});
+  const CommandResult named = run_command({"compare", "info", "convert"});
+  std::filesystem::current_path(before);
+  EXPECT_EQ(dashed.code, 0) << dashed.err;
+  // `info` is the clip here, of a kind its name does not tell, and not the subcommand.
+  EXPECT_EQ(named.code, 1) << named.err;
+  EXPECT_THAT(named.err, StartsWith("kinespace: info"));
+}
+
+TEST(Surroundings, a_comma_locale_changes_nothing_the_command_prints_or_writes) {
+  const TemporaryFolder folder;
+  const std::string input = (folder / "in.bvh").string();
+  write_text(input, walking_bvh(20, 1.25));
+  const CommandOptions comma{
+      .environment = {"LC_ALL=de_DE.UTF-8", "LANG=de_DE.UTF-8", "LOCPATH=" + comma_locale_folder()}};
+  const CommandOptions plain{.environment = {"LC_ALL=C"}};
+  ASSERT_EQ(run_command({"convert", input, (folder / "comma.bvh").string()}, comma).code, 0);
+  ASSERT_EQ(run_command({"convert", input, (folder / "plain.bvh").string()}, plain).code, 0);
+  EXPECT_EQ(read_text(folder / "comma.bvh"), read_text(folder / "plain.bvh"));
+  EXPECT_EQ(run_command({"info", input, "--json"}, comma).out, run_command({"info", input, "--json"}, plain).out);
+  EXPECT_EQ(run_command({"info", input}, comma).out, run_command({"info", input}, plain).out);
+}
+
+TEST(Surroundings, a_program_that_set_a_comma_locale_may_use_the_library) {
+  const TemporaryFolder folder;
+  write_text(folder / "in.bvh", walking_bvh(20, 1.25));
+  const Clip before = read_clip(folder / "in.bvh");
+  ASSERT_EQ(setenv("LOCPATH", comma_locale_folder().c_str(), 1), 0);
+  ASSERT_NE(std::setlocale(LC_ALL, "de_DE.UTF-8"), nullptr);
+  char shown[8];
+  ASSERT_GT(std::snprintf(shown, sizeof shown, "%.1f", 0.5), 0);
+  EXPECT_STREQ(shown, "0,5") << "the locale is in force";
+  const Clip after = read_clip(folder / "in.bvh");
+  write_clip(folder / "out.bvh", after);
+  const Clip again = read_clip(folder / "out.bvh");
+  std::setlocale(LC_ALL, "C");
+  EXPECT_EQ(after.rotations, before.rotations);
+  EXPECT_LT(compare(before, again).max_joint_error_cm, 1e-4);
+}
+
+std::string shown(bool terminal, const std::function<void(cli::ProgressBar&)>& work) {
+  std::FILE* file = std::tmpfile();
+  EXPECT_NE(file, nullptr);
+  {
+    cli::ProgressBar bar(file, terminal);
+    work(bar);
+  }
+  std::string text(static_cast<std::size_t>(std::ftell(file)), '\0');
+  std::rewind(file);
+  EXPECT_EQ(std::fread(text.data(), 1, text.size(), file), text.size());
+  std::fclose(file);
+  return text;
+}
+
+TEST(Surroundings, a_log_gets_a_plain_line_per_stage_and_tenth) {
+  const std::string log = shown(false, [](cli::ProgressBar& bar) {
+    for (int i = 0; i <= 1000; ++i) bar.show("align", i / 1000.0);
+    bar.show("analyse", 0.55);
+  });
+  std::string expected;
+  for (int percent = 0; percent <= 100; percent += 10)
+    expected += "kinespace: align " + std::to_string(percent) + " %\n";
+  EXPECT_EQ(log, expected + "kinespace: analyse 55 %\n");
+}
+
+TEST(Surroundings, a_terminal_gets_a_bar_that_redraws_its_line) {
+  const std::string bar = shown(true, [](cli::ProgressBar& bar) {
+    bar.show("align", 0);
+    bar.show("align", 1);
+    bar.show("align", 0.5);  // late news from another thread
+  });
+  EXPECT_THAT(bar, StartsWith("\ralign "));
+  EXPECT_THAT(bar, HasSubstr("] 100 %\n"));
+  EXPECT_EQ(std::count(bar.begin(), bar.end(), '\n'), 1);
+  EXPECT_EQ(std::count(bar.begin(), bar.end(), '\r'), 2);
+}
+
+TEST(Surroundings, a_signal_stops_work_that_polls_its_progress) {
+  cli::Session session;
+  session.quiet = true;
+  const Progress progress = session.progress();
+  EXPECT_NO_THROW(progress.check_stop());
+  cli::catch_stop_signals();
+  ASSERT_EQ(std::raise(SIGTERM), 0);
+  EXPECT_EQ(cli::stop_signal(), SIGTERM);
+  EXPECT_THROW(progress.check_stop(), Interrupted);
+}
+
+}  // namespace
+}  // namespace kinespace::test
