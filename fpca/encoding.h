@@ -13,6 +13,7 @@
 #include "fpca/motion_space.h"
 #include "fpca/sequences.h"
 #include "fpca/warp.h"
+#include "storage/bitstream.h"
 
 namespace kinespace {
 
@@ -37,6 +38,7 @@ struct EncodedClip {
   Placement placement;
   std::vector<SideTrack> side_tracks;
   std::vector<EncodedRun> runs;
+  MeasuredError error;  // of decoding with all functions, where it was measured
 
   [[nodiscard]] int sequence_count() const;
 };

@@ -43,6 +43,11 @@ struct MotionSpaceOptions {
   void validate() const;
 };
 
+class MotionSpace;
+// fpca/space_codec.h
+[[nodiscard]] Bytes pack_space(const MotionSpace& space);
+[[nodiscard]] MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& source);
+
 // [function][curve]: row k holds x_kc. Groups with fewer functions have zeros in the rows they lack.
 using ScoreMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 

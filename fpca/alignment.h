@@ -1,0 +1,74 @@
+// Time alignment of sequences (yoo2019, section 5.2): for each a warp under which the first few functions of the space leave
+// least of it.
+//
+// A warp is proposed by dynamic time warping (keyframe distance, slopes in [1/2, 2]) to the template of the sequence's group,
+// and both that proposal and the identity are refined by descent on the warp's knots. What is minimised is what the paper
+// aligns for, the part of the curves that the first `functions` functions do not reach,
+//
+//   E(h) = integral sum_c |(I - P)(f_c(h(s)) - mu(s))|^2 ds,      P: projection on these functions.
+//
+// The identity stays unless the best warp takes at least `least_gain` of its E.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "fpca/encoding.h"
+#include "fpca/motion_space.h"
+#include "fpca/warp.h"
+#include "kernels/dtw.h"
+
+namespace kinespace {
+
+struct AlignmentOptions {
+  int functions = 5;         // 1 .. 64; aligned for this level of detail
+  int rounds = 2;            // 0 .. 10; each aligns to the functions of the round before
+  double least_gain = 0.05;  // [0, 1); share of E that a warp must take to be kept
+  int templates = 48;        // 0 .. 1000; groups, each with a template; 0: refine from the identity only
+
+  // Throws Error{usage} naming field, value and legal range.
+  void validate() const;
+};
+
+// Searches warps against the functions of one space (all curves together).
+class WarpSearch {
+ public:
+  WarpSearch(const MotionSpace& space, const AlignmentOptions& options);
+
+  // The best warp of the sequence [first, last] of a run, from the identity and the proposals.
+  [[nodiscard]] Warp best(const RunSampler& run, int first, int last, std::span<const Warp> proposals) const;
+  // E of a warp, for tests and benches.
+  [[nodiscard]] double residual(const RunSampler& run, int first, int last, const Warp& warp) const;
+
+ private:
+  using Row = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  struct Scratch {
+    Row own;         // the sequence over its own time, finely
+    Row projection;  // n x C
+    Eigen::RowVectorXf row;
+  };
+  [[nodiscard]] Scratch prepare(const RunSampler& run, int first, int last) const;
+  [[nodiscard]] double residual(Scratch& scratch, const Warp& warp) const;
+  [[nodiscard]] std::pair<double, Warp> descend(Scratch& scratch, Warp warp) const;
+
+  AlignmentOptions options_;
+  int curves_;
+  Eigen::VectorXf mean_;       // at the search's points, times the root of their weight
+  Row functions_;              // [point][function], orthonormal columns under the plain dot product
+  Eigen::VectorXf root_weight_;
+};
+
+// Groups of similar sequences: `count` templates spread over all of them (farthest first, from the one nearest to the mean;
+// no random choice), and for each sequence the template nearest to it.
+struct TemplateGroups {
+  std::vector<int> templates;  // indices of sequences
+  std::vector<int> group;      // for each sequence an index into templates
+};
+// `vectors`: one row a sequence.
+[[nodiscard]] TemplateGroups group_sequences(const Eigen::MatrixXf& vectors, int count);
+
+// The warp that follows a matching of frames (template frame, own frame), both ends matched.
+[[nodiscard]] Warp warp_of_path(std::span<const FramePair> path, int template_frames, int own_frames);
+
+}  // namespace kinespace

@@ -1,0 +1,309 @@
+#include "fpca/space_builder.h"
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "fpca/pose_features.h"
+
+namespace kinespace {
+namespace {
+
+constexpr int clips_per_block = 16;  // fixed, so that sums do not depend on threads
+
+// Loads every clip once, block by block and the clips of a block in parallel, and hands each to `work` (in parallel) and then
+// to `gather` (one at a time, in order).
+template <typename Result>
+void for_each_clip(const PreparedSource& clips, const Progress& progress, std::string_view stage,
+                   const std::function<Result(int, const PreparedClip&)>& work,
+                   const std::function<void(int, Result&)>& gather) {
+  for (int start = 0; start < clips.count; start += clips_per_block) {
+    progress.check_stop();
+    progress.at(stage, static_cast<double>(start) / clips.count);
+    const int count = std::min(clips_per_block, clips.count - start);
+    std::vector<std::optional<Result>> results(static_cast<std::size_t>(count));
+    tbb::parallel_for(0, count, [&](int i) {
+      const PreparedClip clip = clips.load(start + i);
+      results[static_cast<std::size_t>(i)] = work(start + i, clip);
+    });
+    for (int i = 0; i < count; ++i) gather(start + i, *results[static_cast<std::size_t>(i)]);
+  }
+  progress.at(stage, 1);
+}
+
+struct Survey {
+  OrientationMoments orientations{0};
+  Skeleton skeleton;
+  std::string name;
+  double rate_hz = 0;
+  std::vector<int> lengths;  // frames of each sequence less one
+};
+
+int automatic_points(int longest_sequence) { return std::max(48, longest_sequence + 12); }
+
+// Samples of all sequences of a clip under its warps.
+std::vector<SampleMatrix> clip_samples(const MotionSpace& space, const PreparedClip& clip, const std::vector<Warp>& warps) {
+  SampleMatrix values = clip.curves.values;
+  space.apply_references(values);
+  std::vector<SampleMatrix> out;
+  for (const Run& run : clip.runs) {
+    const RunSampler sampler(values, run, clip.curves.rate_hz);
+    for (int i = 0; i < run.sequence_count(); ++i) {
+      const Warp warp = warps.empty() ? Warp() : warps[out.size()];
+      out.push_back(sampler.sample(run.first_frame(i), run.last_frame(i), warp, space.points()));
+    }
+  }
+  return out;
+}
+
+void merge_into(std::vector<CurveMoments>& all, const std::vector<CurveMoments>& part) {
+  for (std::size_t g = 0; g < all.size(); ++g) all[g].merge(part[g]);
+}
+
+std::vector<CurveMoments> gather_moments(const PreparedSource& clips, const MotionSpace& space,
+                                         const std::vector<std::vector<Warp>>& warps, const Progress& progress,
+                                         std::string_view stage) {
+  std::vector<CurveMoments> all = space.empty_moments();
+  for_each_clip<std::vector<CurveMoments>>(
+      clips, progress, stage,
+      [&](int i, const PreparedClip& clip) {
+        std::vector<CurveMoments> part = space.empty_moments();
+        const auto samples = clip_samples(space, clip, warps.empty() ? std::vector<Warp>() : warps[static_cast<std::size_t>(i)]);
+        space.accumulate(samples, part);
+        return part;
+      },
+      [&](int, std::vector<CurveMoments>& part) { merge_into(all, part); });
+  return all;
+}
+
+// Where each sequence of the library is, and what the templates are chosen by.
+struct SequenceTable {
+  struct Entry {
+    int clip;
+    int rows_start;  // keyframes within the clip's features
+    int rows;
+  };
+  std::vector<Entry> entries;
+  std::vector<int> first_of_clip;
+  Eigen::MatrixXf vectors;
+  FeatureSet features;  // keyframes of each sequence
+};
+
+// Keyframe features and low-order vectors of all sequences.
+SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace& space, int functions,
+                                 const Progress& progress) {
+  struct Part {
+    std::vector<Eigen::VectorXf> vectors;
+    std::vector<std::vector<float>> features;
+    int dims = 0;
+  };
+  SequenceTable table;
+  std::vector<Eigen::VectorXf> vectors;
+  for_each_clip<Part>(
+      clips, progress, "group",
+      [&](int, const PreparedClip& clip) {
+        Part part;
+        const PoseFeatures features = pose_features(clip.curves, clip.skeleton);
+        part.dims = features.dims;
+        const double keys_per_frame = 30.0 / clip.curves.rate_hz;
+        for (const SampleMatrix& samples : clip_samples(space, clip, {})) {
+          const ScoreMatrix scores = space.scores(samples);
+          const Eigen::Index n = std::min<Eigen::Index>(functions, scores.rows());
+          part.vectors.emplace_back(Eigen::Map<const Eigen::VectorXf>(scores.data(), n * scores.cols()));
+        }
+        for (const Run& run : clip.runs) {
+          for (int i = 0; i < run.sequence_count(); ++i) {
+            const int from = std::min(static_cast<int>(std::lround(run.first_frame(i) * keys_per_frame)), features.rows - 1);
+            const int to = std::clamp(static_cast<int>(std::lround(run.last_frame(i) * keys_per_frame)), from, features.rows - 1);
+            part.features.emplace_back(features.values.begin() + static_cast<std::ptrdiff_t>(from) * features.dims,
+                                       features.values.begin() + static_cast<std::ptrdiff_t>(to + 1) * features.dims);
+          }
+        }
+        return part;
+      },
+      [&](int i, Part& part) {
+        table.first_of_clip.push_back(static_cast<int>(table.entries.size()));
+        table.features.dims = part.dims;
+        for (std::size_t s = 0; s < part.vectors.size(); ++s) {
+          const int rows = static_cast<int>(part.features[s].size()) / part.dims;
+          table.entries.push_back({i, 0, rows});
+          table.features.add(part.features[s]);
+          vectors.push_back(std::move(part.vectors[s]));
+        }
+      });
+  table.vectors.resize(static_cast<Eigen::Index>(vectors.size()), vectors.empty() ? 0 : vectors.front().size());
+  for (std::size_t i = 0; i < vectors.size(); ++i) table.vectors.row(static_cast<Eigen::Index>(i)) = vectors[i].transpose();
+  return table;
+}
+
+// For each sequence the warp that its group's template proposes, identity where there is none. By clip.
+std::vector<std::vector<Warp>> propose_warps(const PreparedSource& clips, const MotionSpace& space,
+                                             const AlignmentOptions& options, const Compute& compute,
+                                             const Progress& progress) {
+  std::vector<std::vector<Warp>> out(static_cast<std::size_t>(clips.count));
+  if (options.templates == 0) return out;
+  SequenceTable table = tabulate_sequences(clips, space, 3, progress);
+  const TemplateGroups groups = group_sequences(table.vectors, options.templates);
+  std::vector<ClipPair> pairs;
+  pairs.reserve(table.entries.size());
+  for (std::size_t i = 0; i < table.entries.size(); ++i) {
+    pairs.push_back({groups.templates[static_cast<std::size_t>(groups.group[i])], static_cast<int>(i)});
+  }
+  progress.check_stop();
+  const auto matches = dtw(table.features, table.features, pairs, {.steps = StepPattern::slope_limited, .want_path = true}, compute);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    auto& warps = out[static_cast<std::size_t>(table.entries[i].clip)];
+    const auto& t = table.entries[static_cast<std::size_t>(pairs[i].query)];
+    warps.push_back(matches[i].found() ? warp_of_path(matches[i].path, t.rows, table.entries[i].rows) : Warp());
+  }
+  return out;
+}
+
+std::vector<Warp> align_prepared(const WarpSearch& search, const MotionSpace& space, const PreparedClip& clip,
+                                 const std::vector<Warp>& proposals) {
+  SampleMatrix values = clip.curves.values;
+  space.apply_references(values);
+  std::vector<Warp> out;
+  for (const Run& run : clip.runs) {
+    const RunSampler sampler(values, run, clip.curves.rate_hz);
+    for (int i = 0; i < run.sequence_count(); ++i) {
+      std::span<const Warp> proposal;
+      if (!proposals.empty()) proposal = std::span(proposals).subspan(out.size(), 1);
+      out.push_back(search.best(sampler, run.first_frame(i), run.last_frame(i), proposal));
+    }
+  }
+  return out;
+}
+
+Survey survey(const PreparedSource& clips, const Progress& progress) {
+  Survey all;
+  int longest = 0;
+  for_each_clip<Survey>(
+      clips, progress, "survey",
+      [](int, const PreparedClip& clip) {
+        Survey one{.orientations = OrientationMoments(curve_layout(clip.skeleton).joint_count()),
+                   .skeleton = clip.skeleton, .name = clip.curves.name, .rate_hz = clip.curves.rate_hz};
+        one.orientations.add(clip.curves.values);
+        for (const Run& run : clip.runs) {
+          for (int i = 0; i < run.sequence_count(); ++i) one.lengths.push_back(run.last_frame(i) - run.first_frame(i));
+        }
+        return one;
+      },
+      [&](int i, Survey& one) {
+        for (const int n : one.lengths) longest = std::max(longest, n);
+        if (i == 0) {
+          all = std::move(one);
+          return;
+        }
+        if (!one.skeleton.same_tree(all.skeleton)) {
+          throw Error(ErrorKind::bad_input, {.file = one.name,
+                                             .found = "another joint tree than that of " + all.name,
+                                             .expected = "clips of one skeleton",
+                                             .remedy = "build them apart, or give --by-skeleton for one space each"});
+        }
+        all.orientations.merge(one.orientations);
+      });
+  all.lengths = {longest};
+  return all;
+}
+
+}  // namespace
+
+PreparedClip prepare(const Clip& clip, const SequenceOptions& options) {
+  return {clip.skeleton, clip_curves(clip), cut_sequences(clip, options)};
+}
+
+PreparedSource source_of(const std::vector<PreparedClip>& clips) {
+  return {static_cast<int>(clips.size()), [&clips](int i) { return clips[static_cast<std::size_t>(i)]; }};
+}
+
+void SpaceBuildOptions::validate() const {
+  space.validate();
+  sequences.validate();
+  alignment.validate();
+}
+
+BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& options, const Compute& compute,
+                       const Progress& progress) {
+  options.validate();
+  if (clips.count == 0) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "one clip or more"});
+  const Survey found = survey(clips, progress);
+  const int points = options.space.points != 0 ? options.space.points : std::min(1024, automatic_points(found.lengths.front()));
+  const Eigen::Matrix4Xd references = found.orientations.references();
+
+  MotionSpace space(found.skeleton, options.space, points);
+  space.set_references(references);
+  std::vector<std::vector<Warp>> warps;
+  if (options.align && options.alignment.rounds > 0) {
+    // Aligned for the functions that all curves share, whatever the grouping of the result.
+    MotionSpace pooled(found.skeleton, {.functions = options.alignment.functions}, points);
+    pooled.set_references(references);
+    pooled.fit(gather_moments(clips, pooled, {}, progress, "analyse"), compute);
+    const auto proposals = propose_warps(clips, pooled, options.alignment, compute, progress);
+    for (int round = 0; round < options.alignment.rounds; ++round) {
+      const WarpSearch search(pooled, options.alignment);
+      std::vector<std::vector<Warp>> next(static_cast<std::size_t>(clips.count));
+      for_each_clip<std::vector<Warp>>(
+          clips, progress, "align",
+          [&](int i, const PreparedClip& clip) {
+            const auto index = static_cast<std::size_t>(i);
+            return align_prepared(search, pooled, clip, warps.empty() ? proposals[index] : warps[index]);
+          },
+          [&](int i, std::vector<Warp>& w) { next[static_cast<std::size_t>(i)] = std::move(w); });
+      warps = std::move(next);
+      if (round + 1 < options.alignment.rounds) pooled.fit(gather_moments(clips, pooled, warps, progress, "analyse"), compute);
+    }
+  }
+  space.fit(gather_moments(clips, space, warps, progress, "analyse"), compute);
+  if (warps.empty()) warps.resize(static_cast<std::size_t>(clips.count));
+  return {std::move(space), std::move(warps)};
+}
+
+OrientationMoments::OrientationMoments(int joints) : sums_(static_cast<std::size_t>(joints), Eigen::Matrix4d::Zero()) {}
+
+void OrientationMoments::add(const SampleMatrix& values) {
+  for (std::size_t k = 0; k < sums_.size(); ++k) {
+    const auto q = values.middleCols(3 + 4 * static_cast<Eigen::Index>(k), 4);
+    // The root is turned to heading 0 at the first frame only, and may end anywhere.
+    if (k == 0) {
+      sums_[k] += q.row(0).transpose() * q.row(0) * static_cast<double>(q.rows());
+    } else {
+      sums_[k] += q.transpose() * q;
+    }
+  }
+}
+
+void OrientationMoments::merge(const OrientationMoments& other) {
+  for (std::size_t k = 0; k < sums_.size(); ++k) sums_[k] += other.sums_[k];
+}
+
+Eigen::Matrix4Xd OrientationMoments::references() const {
+  Eigen::Matrix4Xd out(4, static_cast<Eigen::Index>(sums_.size()));
+  for (std::size_t k = 0; k < sums_.size(); ++k) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sums_[k]);
+    Eigen::Vector4d axis = solver.eigenvectors().col(3);
+    Eigen::Index largest = 0;
+    axis.cwiseAbs().maxCoeff(&largest);
+    if (axis(largest) < 0) axis = -axis;
+    out.col(static_cast<Eigen::Index>(k)) = axis;
+  }
+  return out;
+}
+
+std::vector<Warp> align_clip(const WarpSearch& search, const ClipCurves& curves, const std::vector<Run>& runs) {
+  std::vector<Warp> out;
+  for (const Run& run : runs) {
+    const RunSampler sampler(curves.values, run, curves.rate_hz);
+    for (int i = 0; i < run.sequence_count(); ++i) {
+      out.push_back(search.best(sampler, run.first_frame(i), run.last_frame(i), {}));
+    }
+  }
+  return out;
+}
+
+}  // namespace kinespace

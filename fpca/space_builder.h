@@ -1,0 +1,70 @@
+// From clips to a motion space: cut, align, analyse.
+//
+// Clips are read one at a time from a source, as often as there are rounds, so memory does not grow with their number beyond
+// what the source keeps: moments (T x T), a few numbers a sequence, and the clip in hand.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "base/progress.h"
+#include "fpca/alignment.h"
+#include "fpca/encoding.h"
+#include "fpca/motion_space.h"
+#include "fpca/sequences.h"
+
+namespace kinespace {
+
+// A clip made ready: its curves, and where it is cut.
+struct PreparedClip {
+  Skeleton skeleton;
+  ClipCurves curves;
+  std::vector<Run> runs;
+};
+[[nodiscard]] PreparedClip prepare(const Clip& clip, const SequenceOptions& options = {});
+
+[[nodiscard]] Bytes pack_prepared(const PreparedClip& clip);
+[[nodiscard]] PreparedClip unpack_prepared(std::span<const std::byte> bytes, const std::string& source);
+
+// Clips by number. `load` may be called from several threads.
+struct PreparedSource {
+  int count = 0;
+  std::function<PreparedClip(int)> load;
+};
+[[nodiscard]] PreparedSource source_of(const std::vector<PreparedClip>& clips);
+
+struct SpaceBuildOptions {
+  MotionSpaceOptions space;
+  SequenceOptions sequences;
+  AlignmentOptions alignment;
+  bool align = true;
+
+  void validate() const;
+};
+
+struct BuiltSpace {
+  MotionSpace space;
+  std::vector<std::vector<Warp>> warps;  // for each clip, one a sequence
+};
+
+// All clips must have the tree of the first; throws Error{bad_input} naming the two that differ, and Error{usage} for no
+// clips. The result does not depend on threads.
+[[nodiscard]] BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& options,
+                                     const Compute& compute = {}, const Progress& progress = {});
+
+// The main axis of sum q q' for each joint (markley 2007), canonical sign: largest entry positive. 4 x J.
+class OrientationMoments {
+ public:
+  explicit OrientationMoments(int joints);
+  void add(const SampleMatrix& values);  // curves of a clip
+  void merge(const OrientationMoments& other);
+  [[nodiscard]] Eigen::Matrix4Xd references() const;
+
+ private:
+  std::vector<Eigen::Matrix4d> sums_;
+};
+
+// Warps of one clip against a space, without templates: how clips outside the library are aligned.
+[[nodiscard]] std::vector<Warp> align_clip(const WarpSearch& search, const ClipCurves& curves, const std::vector<Run>& runs);
+
+}  // namespace kinespace
