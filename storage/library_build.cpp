@@ -43,16 +43,24 @@ void require_replaceable(const std::filesystem::path& target) {
                                  .remedy = "give another output name"});
 }
 
-bool holds_sound_keep(Database& database, const std::string& fingerprint) {
+// What an earlier build left, when it is sound and of the same fingerprint.
+std::unique_ptr<Database> open_sound_keep(const std::filesystem::path& path, const std::string& shown,
+                                          const std::string& fingerprint) {
   try {
-    schema::check(database, schema::keep());
-    Statement query = database.prepare("SELECT fingerprint FROM build");
-    if (!query.step() || query.text(0) != fingerprint) return false;
-    Statement verdict = database.prepare("PRAGMA quick_check(1)");
-    return verdict.step() && verdict.text(0) == "ok";
+    auto database = std::make_unique<Database>(path, Mode::read_write, shown);
+    schema::check(*database, schema::keep());
+    if (Statement query = database->prepare("SELECT fingerprint FROM build");
+        !query.step() || query.text(0) != fingerprint) {
+      return nullptr;
+    }
+    if (Statement verdict = database->prepare("PRAGMA integrity_check(1)");
+        !verdict.step() || verdict.text(0) != "ok") {
+      return nullptr;
+    }
+    return database;
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::bad_input) throw;
-    return false;  // damaged, or none yet: start over
+    return nullptr;  // damaged, or none yet
   }
 }
 
@@ -128,9 +136,8 @@ struct LibraryBuild::State {
 void LibraryBuild::State::open_keep() {
   std::string fingerprint = options.fingerprint;
   if (options.extend) fingerprint += "\nextends " + build_files::identity_of(target);
-  keep = std::make_unique<Database>(lock.path(), Mode::read_write, shown);
-  if (!holds_sound_keep(*keep, fingerprint)) {
-    keep.reset();
+  keep = open_sound_keep(lock.path(), shown, fingerprint);
+  if (!keep) {
     lock.clear();
     keep = std::make_unique<Database>(lock.path(), Mode::read_write, shown);
     schema::make(*keep, schema::keep());
