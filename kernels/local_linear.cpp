@@ -52,12 +52,14 @@ struct Design {
 }  // namespace
 
 double kernel_value(SmoothingKernel kernel, double u) {
+  // A point on the window's edge has no weight, however its distance was rounded.
+  constexpr double rounding = 1e-12;
   const double inside = 1 - u * u;
   switch (kernel) {
     case SmoothingKernel::epanechnikov:
-      return inside > 0 ? 0.75 * inside : 0;
+      return inside > rounding ? 0.75 * inside : 0;
     case SmoothingKernel::quartic:
-      return inside > 0 ? 15.0 / 16.0 * inside * inside : 0;
+      return inside > rounding ? 15.0 / 16.0 * inside * inside : 0;
     case SmoothingKernel::gauss:
       return std::exp(-0.5 * u * u) * std::numbers::inv_sqrtpi / std::numbers::sqrt2;
   }

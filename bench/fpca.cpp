@@ -1,0 +1,194 @@
+// `kinespace bench fpca`: how near pace mode is to the package, and what an analysis costs against its one big product.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <numbers>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "bench/report.h"
+#include <cblas.h>
+
+#include "fpca/curves.h"
+#include "fpca/functional_pca.h"
+#include "fpca/golden.h"
+#include "motion/read.h"
+
+namespace kinespace {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int curve_count = 6510;
+constexpr int curve_points = 100;
+
+struct Sample {
+  CurveMatrix curves;
+  std::string source;
+};
+
+// Rows of `out` from `row` on: the rotation curves of the second in the middle of a clip. Returns the next free row.
+Eigen::Index add_middle_second(const ClipCurves& clip, CurveMatrix& out, Eigen::Index row) {
+  const double last_frame = std::min<double>(clip.frames() - 1, std::round(clip.rate_hz));
+  const double first_frame = std::floor((clip.frames() - 1 - last_frame) / 2);
+  for (Eigen::Index curve = 3; curve < clip.values.cols() && row < out.rows(); ++curve, ++row) {
+    for (int t = 0; t < curve_points; ++t) {
+      const double frame = first_frame + last_frame * t / (curve_points - 1);
+      const auto below = std::min(static_cast<Eigen::Index>(frame), static_cast<Eigen::Index>(clip.frames() - 2));
+      const double share = frame - static_cast<double>(below);
+      out(row, t) = (1 - share) * clip.values(below, curve) + share * clip.values(below + 1, curve);
+    }
+  }
+  return row;
+}
+
+std::vector<fs::path> motion_files(const fs::path& folder) {
+  std::vector<fs::path> out;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (is_motion_file(entry.path())) out.push_back(entry.path());
+  }
+  std::sort(out.begin(), out.end());
+  return out;
+}
+
+// Every so many clips of bandai2, so that all its contents are among the curves; none when there are too few clips.
+Eigen::Index fill_from_clips(const fs::path& folder, CurveMatrix& out) {
+  const std::vector<fs::path> files = motion_files(folder);
+  constexpr std::size_t clips_wanted = 90;
+  const std::size_t stride = std::max<std::size_t>(1, files.size() / clips_wanted);
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < files.size() && row < out.rows(); i += stride) {
+    const Clip clip = read_clip(files[i]);
+    if (clip.frames >= 2) row = add_middle_second(clip_curves(clip), out, row);
+  }
+  return row;
+}
+
+// Smooth curves with noise, for machines without the data.
+void fill_generated(CurveMatrix& out) {
+  std::mt19937 generator(1);
+  const auto uniform = [&] { return static_cast<double>(generator()) / 4294967296.0 - 0.5; };
+  for (Eigen::Index i = 0; i < out.rows(); ++i) {
+    std::array<double, 8> scores;
+    for (std::size_t k = 0; k < scores.size(); ++k) scores[k] = uniform() * std::pow(0.5, static_cast<double>(k));
+    for (int t = 0; t < curve_points; ++t) {
+      out(i, t) = 0.02 * uniform();
+      for (std::size_t k = 0; k < scores.size(); ++k) {
+        out(i, t) += scores[k] * std::cos(std::numbers::pi * static_cast<double>(k) * t / (curve_points - 1));
+      }
+    }
+  }
+}
+
+Sample sample_curves(const BenchOptions& options) {
+  Sample out{CurveMatrix(curve_count, curve_points), "bandai2"};
+  if (fill_from_clips(options.data / "bandai2", out.curves) < out.curves.rows()) {
+    fill_generated(out.curves);
+    out.source = "generated";
+  }
+  out.source += ", " + std::to_string(curve_count) + " curves x " + std::to_string(curve_points) + " points";
+  return out;
+}
+
+FpcaOptions timed_options() {
+  return {.mean = MeanEstimate::smooth,
+          .smooth_covariance = true,
+          .estimate_noise = true,
+          .scores = ScoreKind::conditional};
+}
+
+template <typename Work>
+double milliseconds(const Work& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+void product_alone(const CurveMatrix& curves, Eigen::MatrixXd& gram) {
+  cblas_dsyrk(CblasColMajor, CblasLower, CblasNoTrans, curve_points, curve_count, 1, curves.data(), curve_points, 0,
+              gram.data(), curve_points);
+}
+
+// The three are run in turn, so that another process on the machine slows all of them alike.
+void measure_speed(const BenchOptions& options, BenchReport& report) {
+  const Sample sample = sample_curves(options);
+  openblas_set_num_threads(1);
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(curve_points, curve_points);
+  FunctionalPcaWorkspace workspace(curve_points, timed_options());
+  std::vector<double> product, whole, reused;
+  double used = 0;  // so that no result is thrown away unseen
+  constexpr int warm_up = 5, repeats = 41;
+  for (int i = 0; i < warm_up + repeats; ++i) {
+    const double product_ms = milliseconds([&] { product_alone(sample.curves, gram); });
+    const double whole_ms =
+        milliseconds([&] { used += fit_functional_pca(sample.curves, timed_options()).scores(sample.curves)(0, 0); });
+    const double reused_ms = milliseconds([&] { used += workspace.fit(sample.curves).scores(sample.curves)(0, 0); });
+    if (i < warm_up) continue;
+    product.push_back(product_ms);
+    whole.push_back(whole_ms);
+    reused.push_back(reused_ms);
+  }
+  const double bare = median(product), all = median(whole), warm = median(reused);
+  const bool finite = std::isfinite(used + gram(0, 0));
+  const auto add = [&](const char* name, double value, const char* unit, std::optional<double> bar = {}) {
+    report.results.push_back(
+        {.name = name, .data = sample.source, .value = finite ? value : std::nan(""), .unit = unit, .bar = bar});
+  };
+  add("bare DSYRK, median", bare, "ms");
+  add("smoothed FPCA with sigma^2 and conditional scores, set-up included, median", all, "ms");
+  add("the same with its workspace reused, median", warm, "ms");
+  add("smoothed FPCA over bare DSYRK, set-up included, one thread each", all / bare, "x", 3);
+  add("smoothed FPCA over bare DSYRK, workspace reused, one thread each", warm / bare, "x");
+}
+
+std::optional<fs::path> golden_folder(const BenchOptions& options) {
+  if (options.golden) return options.golden;
+  const char* named = std::getenv("KINESPACE_GOLDEN");
+  const fs::path standard = named != nullptr && *named != '\0' ? fs::path(named) : fs::path("../shared/golden/fpca");
+  std::error_code error;
+  if (fs::is_directory(standard, error)) return standard;
+  return std::nullopt;
+}
+
+// The worst of all cases for each quantity.
+void compare_golden(const fs::path& folder, BenchReport& report) {
+  std::map<std::string, GoldenDifference> worst;
+  const std::vector<fs::path> cases = find_golden_cases(folder);
+  for (const fs::path& path : cases) {
+    const GoldenCase golden = read_golden_case(path);
+    const FunctionalPca ours = fit_functional_pca(golden.curves, golden.options, golden.domain);
+    for (const GoldenDifference& difference : compare_with_golden(golden, ours)) {
+      const auto [entry, first] = worst.try_emplace(difference.quantity, difference);
+      if (!first && !(difference.relative <= entry->second.relative)) entry->second = difference;
+    }
+  }
+  for (const auto& [quantity, difference] : worst) {
+    report.results.push_back({.name = "largest relative difference from the package: " + quantity,
+                              .data = "golden, " + std::to_string(cases.size()) + " cases",
+                              .value = difference.relative,
+                              .unit = "",
+                              .bar = difference.bar});
+  }
+}
+
+}  // namespace
+
+BenchReport bench_fpca(const BenchOptions& options) {
+  BenchReport report{.bench = "fpca", .device = "cpu", .threads = 1, .results = {}};
+  if (const auto golden = golden_folder(options)) compare_golden(*golden, report);
+  measure_speed(options, report);
+  return report;
+}
+
+}  // namespace kinespace
