@@ -105,7 +105,7 @@ class Hierarchy {
 
   void open_joint() {
     Joint joint{.name = words_.take_name(), .parent = levels_.empty() ? -1 : levels_.back()};
-    if (joint.name.empty()) words_.fail("the name of a joint");
+    if (joint.name.empty()) words_.source().fail_at_word(words_.at(), "the name of a joint");
     joints_.push_back(std::move(joint));
     has_offset_.push_back(false);
     open(static_cast<int>(joints_.size()) - 1);

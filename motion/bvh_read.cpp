@@ -116,7 +116,8 @@ class MotionParser {
   }
 
   [[noreturn]] void fail_count(std::int64_t found) const {
-    source_.fail(at_, std::to_string(found) + (found == 1 ? " frame" : " frames") + " of data",
+    source_.fail(found < frames_ ? source_.end() : at_,
+                 std::to_string(found) + (found == 1 ? " frame" : " frames") + " of data",
                  std::to_string(frames_) + " as \"Frames:\" says",
                  found < frames_ ? "the file is cut short" : "correct the frame count");
   }

@@ -18,6 +18,12 @@ bool has_ending(const std::filesystem::path& path, std::string_view ending) {
   return same_word(path.extension().string(), ending);
 }
 
+constexpr const char* writable_endings = ".bvh, .amc, .glb or .gltf";
+
+bool can_write(const std::filesystem::path& path) {
+  return is_motion_file(path) || has_ending(path, ".glb") || has_ending(path, ".gltf");
+}
+
 std::vector<std::filesystem::path> skeleton_files(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> out;
   std::error_code code;
@@ -45,13 +51,12 @@ std::filesystem::path skeleton_of(const std::filesystem::path& amc) {
                                      .remedy = "put the .asf file beside it or name it"});
 }
 
-[[noreturn]] void fail_ending(const std::filesystem::path& path, const std::string& expected) {
+[[noreturn]] void fail_ending(ErrorKind kind, const std::filesystem::path& path, const std::string& expected) {
   const std::string ending = path.extension().string();
-  throw Error(ErrorKind::bad_input,
-              {.file = path.string(),
-               .found = ending.empty() ? "no ending" : "the ending \"" + ending + "\"",
-               .expected = expected,
-               .remedy = has_ending(path, ".asf") ? "name the .amc file; its .asf is found" : ""});
+  throw Error(kind, {.file = path.string(),
+                     .found = ending.empty() ? "no ending" : "the ending \"" + ending + "\"",
+                     .expected = expected,
+                     .remedy = has_ending(path, ".asf") ? "name the .amc file; its .asf is found" : ""});
 }
 
 }  // namespace
@@ -59,14 +64,26 @@ std::filesystem::path skeleton_of(const std::filesystem::path& amc) {
 Clip read_clip(const std::filesystem::path& path, const std::optional<std::filesystem::path>& asf) {
   if (has_ending(path, ".bvh")) return read_bvh(path);
   if (has_ending(path, ".amc")) return read_amc(path, asf ? *asf : skeleton_of(path));
-  fail_ending(path, "a motion file: .bvh or .amc");
+  fail_ending(ErrorKind::bad_input, path, "a motion file: .bvh or .amc");
 }
 
 void write_clip(const std::filesystem::path& path, const Clip& clip) {
   if (has_ending(path, ".bvh")) return write_bvh(path, clip);
   if (has_ending(path, ".amc")) return write_amc(path, clip);
   if (has_ending(path, ".glb") || has_ending(path, ".gltf")) return write_gltf(path, clip);
-  fail_ending(path, ".bvh, .amc, .glb or .gltf");
+  fail_ending(ErrorKind::usage, path, writable_endings);
+}
+
+std::vector<std::filesystem::path> files_read(const std::filesystem::path& path,
+                                              const std::optional<std::filesystem::path>& asf) {
+  if (!has_ending(path, ".amc")) return {path};
+  return {path, asf ? *asf : skeleton_of(path)};
+}
+
+std::vector<std::filesystem::path> files_written(const std::filesystem::path& path) {
+  if (has_ending(path, ".amc")) return {path, std::filesystem::path(path).replace_extension(".asf")};
+  if (!can_write(path)) fail_ending(ErrorKind::usage, path, writable_endings);
+  return {path};
 }
 
 bool is_motion_file(const std::filesystem::path& path) {

@@ -3,17 +3,24 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "motion/clip.h"
 
 namespace kinespace {
 
-// Reads .bvh, or .amc with its .asf: `asf` when given, else the one .asf file beside it whose name starts the AMC's
-// (01_02.amc -> 01.asf), else the only .asf in the folder. Throws Error.
+// Reads .bvh, or .amc with its .asf: `asf` when given, else the .asf file beside it whose name starts the AMC's
+// (01_02.amc -> 01.asf; the longest such name), else the only .asf in the folder. Throws Error.
 [[nodiscard]] Clip read_clip(const std::filesystem::path& path, const std::optional<std::filesystem::path>& asf = {});
 
 // Writes .bvh, .amc (with an .asf beside it), .glb or .gltf. The file is whole or not there. Throws Error.
 void write_clip(const std::filesystem::path& path, const Clip& clip);
+
+// The files that read_clip would read, and those that write_clip would write: an .amc goes with an .asf. For a caller
+// who must not overwrite an input. Throw Error: no skeleton beside an .amc, an ending that cannot be written.
+[[nodiscard]] std::vector<std::filesystem::path> files_read(const std::filesystem::path& path,
+                                                            const std::optional<std::filesystem::path>& asf = {});
+[[nodiscard]] std::vector<std::filesystem::path> files_written(const std::filesystem::path& path);
 
 // True for endings that read_clip takes.
 [[nodiscard]] bool is_motion_file(const std::filesystem::path& path);

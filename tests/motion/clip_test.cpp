@@ -7,10 +7,15 @@ namespace {
 
 Skeleton two_joints() {
   Skeleton s;
-  s.joints.push_back({.name = "root", .parent = -1, .offset = {0, 90, 0},
+  s.joints.push_back({.name = "root",
+                      .parent = -1,
+                      .offset = {0, 90, 0},
                       .channels = {Channel::x_position, Channel::y_position, Channel::z_position, Channel::z_rotation,
-                                   Channel::x_rotation, Channel::y_rotation}, .end_site = {}});
-  s.joints.push_back({.name = "knee", .parent = 0, .offset = {0, -45, 0},
+                                   Channel::x_rotation, Channel::y_rotation},
+                      .end_site = {}});
+  s.joints.push_back({.name = "knee",
+                      .parent = 0,
+                      .offset = {0, -45, 0},
                       .channels = {Channel::z_rotation, Channel::x_rotation, Channel::y_rotation},
                       .end_site = Eigen::Vector3d(0, -45, 0)});
   return s;
@@ -33,7 +38,9 @@ TEST(Clip, a_slice_keeps_the_tracks_of_its_frames) {
   EXPECT_EQ(part.rotation(1, 1).x(), 1);
 }
 
-TEST(Skeleton, the_height_of_a_standing_rest_pose_is_its_extent) { EXPECT_DOUBLE_EQ(two_joints().rest_height(), 90); }
+TEST(Skeleton, the_height_of_a_standing_rest_pose_is_its_extent) {
+  EXPECT_DOUBLE_EQ(two_joints().rest_height(), 90);
+}
 
 }  // namespace
 }  // namespace kinespace
