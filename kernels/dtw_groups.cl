@@ -1,8 +1,8 @@
 // Batched DTW for GPUs: one work-group of 64 items matches one pair of clips.
 //
-// The table is walked in tiles of 64 x 64 cells. The group sums a tile's distances like a matrix product (8 x 8 cells an
-// item, features staged in local memory), then sweeps it along anti-diagonals, item t owning row t of the tile; only the
-// last row of a strip of tiles goes through global memory. Build options: SLOPE_LIMITED and WANT_PATH, 0 or 1.
+// The table is walked in tiles of 64 x 64 cells. The group sums a tile's distances like a matrix product (8 x 8 cells
+// an item, features staged in local memory), then sweeps it along anti-diagonals, item t owning row t of the tile; only
+// the last row of a strip of tiles goes through global memory. Build options: SLOPE_LIMITED and WANT_PATH, 0 or 1.
 
 #define SIDE 64   // cells of a tile, items of a group
 #define BLOCK 8   // cells of an item in the distances
@@ -77,7 +77,7 @@ __kernel __attribute__((reqd_work_group_size(SIDE, 1, 1))) void dtw_groups(
   const int words = (job.m + 15) / 16;
   for (int i0 = 0; i0 < job.n; i0 += SIDE) {
     const int i = i0 + item;
-    float left = INFINITY;                                     // what a straight step along the row may start from
+    float left = INFINITY;  // what a straight step along the row may start from
     float corner = i == 0 ? 0.0f : INFINITY;
     for (int j0 = 0; j0 < job.m; j0 += SIDE) {
       tile_distances(queries, targets, dims, stride, job, i0, j0, squared, a, b, tile);

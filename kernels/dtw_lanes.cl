@@ -1,8 +1,9 @@
 // Batched DTW for processors: one work-item a group matches one query clip with sixteen target clips, one in each lane.
 //
-// Four target frames are interleaved over the lanes and stay in the first cache while all query rows pass over them, four
-// at a time: 4 x 4 distances are summed in registers and the recurrence follows in the same loop. Build options:
-// SLOPE_LIMITED and WANT_PATH, 0 or 1. The host gives for each tile of four frames the query rows that have legal cells.
+// Four target frames are interleaved over the lanes and stay in the first cache while all query rows pass over them,
+// four at a time: 4 x 4 distances are summed in registers and the recurrence follows in the same loop. Build options:
+// SLOPE_LIMITED and WANT_PATH, 0 or 1. The host gives for each tile of four frames the query rows that have legal
+// cells.
 
 #define LANES 16
 #define ROWS 4
@@ -40,17 +41,18 @@ inline void transpose(float16* rows) {
     for (int l = 0; l < LANES / 2; ++l) {
       const float16 a = rows[l];
       const float16 b = rows[l + LANES / 2];
-      turned[2 * l] = (float16)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3, a.s4, b.s4, a.s5, b.s5, a.s6, b.s6,
-                                a.s7, b.s7);
-      turned[2 * l + 1] = (float16)(a.s8, b.s8, a.s9, b.s9, a.sa, b.sa, a.sb, b.sb, a.sc, b.sc, a.sd, b.sd, a.se, b.se,
-                                    a.sf, b.sf);
+      turned[2 * l] =
+          (float16)(a.s0, b.s0, a.s1, b.s1, a.s2, b.s2, a.s3, b.s3, a.s4, b.s4, a.s5, b.s5, a.s6, b.s6, a.s7, b.s7);
+      turned[2 * l + 1] =
+          (float16)(a.s8, b.s8, a.s9, b.s9, a.sa, b.sa, a.sb, b.sb, a.sc, b.sc, a.sd, b.sd, a.se, b.se, a.sf, b.sf);
     }
 #pragma unroll
     for (int l = 0; l < LANES; ++l) rows[l] = turned[l];
   }
 }
 
-// FRAMES frames of every lane's target from frame j on, as [feature][frame][lane]; the last frame stands in after the end.
+// FRAMES frames of every lane's target from frame j on, as [feature][frame][lane]; the last frame stands in after the
+// end.
 inline void load_tile(__global const float* restrict targets, __global const Lanes* restrict lanes, int stride, int j,
                       __global float16* restrict tile) {
   for (int c = 0; c < FRAMES; ++c) {
@@ -70,9 +72,9 @@ inline void load_tile(__global const float* restrict targets, __global const Lan
 
 __kernel __attribute__((reqd_work_group_size(1, 1, 1))) void dtw_lanes(
     __global const float* restrict queries, __global const float* restrict targets, int dims, int stride,
-    __global const Job* restrict jobs, __global const TileRange* restrict ranges, __global const Lanes* restrict all_lanes,
-    int banded, int squared, int prefer_query, __global float16* restrict scratch, __global uint16* restrict all_steps,
-    __global float16* restrict costs) {
+    __global const Job* restrict jobs, __global const TileRange* restrict ranges,
+    __global const Lanes* restrict all_lanes, int banded, int squared, int prefer_query,
+    __global float16* restrict scratch, __global uint16* restrict all_steps, __global float16* restrict costs) {
   const Job job = jobs[get_global_id(0)];
   __global const Lanes* restrict lanes = all_lanes + get_global_id(0);
   __global const float* query = queries + (size_t)job.query_row * stride;

@@ -12,21 +12,22 @@
 namespace kinespace {
 
 struct KernelDescriptor {
-  using Sizes = std::vector<int>;  // what they mean is the kernel's own, in the order of `size_names`
+  using Sizes = std::vector<int>;  // in the order of `size_names`
 
   struct Comparison {
-    double error = 0;  // largest |kernel - reference| over the scale of the reference
+    double error = 0;  // largest |kernel - reference| over the largest |reference|; infinity where only one is finite
     double kernel_seconds = 0;
     double reference_seconds = 0;
   };
 
   std::string name;
+  KernelFamily family = KernelFamily::dtw;
   std::vector<std::string> size_names;
-  std::vector<Sizes> test_sizes;  // with 0, 1, the group's size and its neighbours, and odd ones
+  std::vector<Sizes> test_sizes;  // with 0, 1, the tiles' sizes and their neighbours, and odd ones
   Sizes bench_sizes;
   double tolerance = 0;  // on Comparison::error
   std::function<double(const Sizes&)> flops;
-  std::function<double(const Sizes&)> bytes;  // that must move at least
+  std::function<double(const Sizes&)> bytes;  // read and written, each number once
   // Makes data from the seed, computes both and compares.
   std::function<Comparison(const Sizes&, const Compute&, std::uint32_t seed)> compare;
 };

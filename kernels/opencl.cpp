@@ -97,4 +97,15 @@ cl::Kernel OpenClDevice::kernel(const char* source, const std::string& options, 
   });
 }
 
+void OpenClDevice::fetch(const cl::CommandQueue& queue, const cl::Buffer& from, void* to, std::size_t bytes) const {
+  if (!is_processor()) {
+    queue.enqueueReadBuffer(from, CL_TRUE, 0, bytes, to);
+    return;
+  }
+  // The driver may have used memory of its own: mapping brings the results to the caller's.
+  void* mapped = queue.enqueueMapBuffer(from, CL_TRUE, CL_MAP_READ, 0, bytes);
+  queue.enqueueUnmapMemObject(from, mapped);
+  queue.finish();
+}
+
 }  // namespace kinespace

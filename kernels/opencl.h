@@ -62,6 +62,13 @@ class OpenClDevice {
     const cl_mem_flags placed = is_processor() ? CL_MEM_USE_HOST_PTR : CL_MEM_COPY_HOST_PTR;
     return {context_, CL_MEM_READ_ONLY | placed, values.size_bytes(), const_cast<T*>(values.data())};
   }
+  // For results; fetch() waits for the queue and brings them to `to`, the span's memory.
+  template <typename T>
+  [[nodiscard]] cl::Buffer output(std::span<T> values) const {
+    if (!is_processor() || values.empty()) return scratch(values.size_bytes());
+    return {context_, CL_MEM_WRITE_ONLY | CL_MEM_USE_HOST_PTR, values.size_bytes(), values.data()};
+  }
+  void fetch(const cl::CommandQueue& queue, const cl::Buffer& from, void* to, std::size_t bytes) const;
   [[nodiscard]] cl::Buffer scratch(std::size_t bytes) const {
     return {context_, CL_MEM_READ_WRITE, bytes == 0 ? 1 : bytes};
   }

@@ -1,0 +1,53 @@
+// Every kernel against its plain reference, over the sizes of its descriptor, on the processor and in both OpenCL
+// shapes.
+#include <cctype>
+
+#include <gtest/gtest.h>
+
+#include "kernels/kernel_descriptor.h"
+#include "tests/kernels/opencl_device.h"
+
+namespace kinespace {
+namespace {
+
+std::string sizes_text(const KernelDescriptor& kernel, const KernelDescriptor::Sizes& sizes) {
+  std::string text = kernel.name;
+  for (std::size_t s = 0; s < sizes.size(); ++s) text += ", " + kernel.size_names[s] + " " + std::to_string(sizes[s]);
+  return text;
+}
+
+void expect_equivalent(const KernelDescriptor& kernel, const Compute& compute) {
+  ASSERT_FALSE(kernel.test_sizes.empty());
+  for (const auto& sizes : kernel.test_sizes) {
+    for (const std::uint32_t seed : {1U, 2U}) {
+      EXPECT_LE(kernel.compare(sizes, compute, seed).error, kernel.tolerance) << sizes_text(kernel, sizes);
+    }
+  }
+}
+
+class equivalence : public testing::TestWithParam<KernelDescriptor> {};
+
+TEST_P(equivalence, processor_agrees_with_reference) {
+  expect_equivalent(GetParam(), Compute::open("cpu"));
+}
+
+TEST_P(equivalence, opencl_lanes_agree_with_reference) {
+  KINESPACE_REQUIRE_OPENCL();
+  expect_equivalent(GetParam(), Compute::open("opencl").with_variant(KernelVariant::lanes));
+}
+
+TEST_P(equivalence, opencl_groups_agree_with_reference) {
+  KINESPACE_REQUIRE_OPENCL();
+  expect_equivalent(GetParam(), Compute::open("opencl").with_variant(KernelVariant::groups));
+}
+
+std::string test_name(const testing::TestParamInfo<KernelDescriptor>& kernel) {
+  std::string name = kernel.param.name;
+  for (char& letter : name) letter = std::isalnum(static_cast<unsigned char>(letter)) != 0 ? letter : '_';
+  return name;
+}
+
+INSTANTIATE_TEST_SUITE_P(kernels, equivalence, testing::ValuesIn(kernel_descriptors()), test_name);
+
+}  // namespace
+}  // namespace kinespace
