@@ -19,14 +19,9 @@ struct ConvertOptions {
   bool json = false;
 };
 
-// Every file the conversion would write against every file it reads.
 void require_inputs_survive(const ConvertOptions& options) {
-  std::vector<std::filesystem::path> outputs{options.output};
-  if (options.output.extension() == ".amc")
-    outputs.push_back(std::filesystem::path(options.output).replace_extension(".asf"));
-  std::vector<std::filesystem::path> inputs{options.input};
-  if (options.asf) inputs.push_back(*options.asf);
-  for (const auto& output : outputs) {
+  const auto inputs = files_read(options.input, options.asf);
+  for (const auto& output : files_written(options.output)) {
     for (const auto& input : inputs) require_different_files(input, output);
   }
 }

@@ -19,8 +19,8 @@ ARROWS = {
     "fpca": "base motion storage kernels",
     "synthesis": "base motion storage kernels fpca",
     "examples": "base motion",
-    "bench": "base motion storage kernels fpca synthesis examples",
-    "cli": "base motion storage kernels fpca synthesis examples bench",
+    "bench": "base motion storage kernels fpca synthesis",
+    "cli": "base motion storage kernels fpca synthesis bench",
     "tests": "base motion storage kernels fpca synthesis examples bench cli",
 }
 ARROWS = {folder: set(others.split()) | {folder} for folder, others in ARROWS.items()}

@@ -54,6 +54,7 @@ TEST_F(ExitCode, usage_errors_are_2_and_name_the_help_that_answers_them) {
   const CommandResult unknown = run_command({"info", walk(), "--jsn"});
   expect_one_line(unknown, 2, "");
   EXPECT_THAT(unknown.err, HasSubstr("--jsn"));
+  expect_one_line(run_command({"convert", walk(), path("out.xyz")}), 2, path("out.xyz") + ": ");
   const CommandResult bench = run_command({"bench", "nothing"});
   expect_one_line(bench, 2, "");
 }
@@ -68,7 +69,7 @@ TEST_F(ExitCode, missing_input_is_1_and_named) {
 TEST_F(ExitCode, wrong_input_is_1_with_the_line) {
   std::string text = walking_bvh(20, 1);
   const auto at = text.find("Frame Time: 0.01\n") + 17;
-  text.replace(at, 1, "x");
+  text[at] = 'x';
   write_text(folder_ / "bad.bvh", text);
   const auto line = std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n') + 1;
   const std::string start = path("bad.bvh") + ":" + std::to_string(line) + ": ";

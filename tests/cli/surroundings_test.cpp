@@ -111,15 +111,15 @@ TEST(Surroundings, a_log_gets_a_plain_line_per_stage_and_tenth) {
 }
 
 TEST(Surroundings, a_terminal_gets_a_bar_that_redraws_its_line) {
-  const std::string bar = shown(true, [](cli::ProgressBar& bar) {
+  const std::string text = shown(true, [](cli::ProgressBar& bar) {
     bar.show("align", 0);
     bar.show("align", 1);
     bar.show("align", 0.5);  // late news from another thread
   });
-  EXPECT_THAT(bar, StartsWith("\ralign "));
-  EXPECT_THAT(bar, HasSubstr("] 100 %\n"));
-  EXPECT_EQ(std::count(bar.begin(), bar.end(), '\n'), 1);
-  EXPECT_EQ(std::count(bar.begin(), bar.end(), '\r'), 2);
+  EXPECT_THAT(text, StartsWith("\ralign "));
+  EXPECT_THAT(text, HasSubstr("] 100 %\n"));
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\r'), 2);
 }
 
 TEST(Surroundings, a_signal_stops_work_that_polls_its_progress) {
