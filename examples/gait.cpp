@@ -24,6 +24,8 @@ double Path::bank() const {
 
 std::vector<FootTrack> plan_steps(const Gait& gait, const Build& build, double duration_s, Random& random,
                                   double variation) {
+  // Leaning into a turn, the hips are further inside than the feet.
+  const double inside = std::tan(gait.path.bank()) * build.standing;
   std::vector<FootTrack> feet;
   for (int side = 0; side < 2; ++side) {
     const double outwards = side == 0 ? 1 : -1;
@@ -36,7 +38,7 @@ std::vector<FootTrack> plan_steps(const Gait& gait, const Build& build, double d
       Plant plant;
       plant.yaw = gait.path.heading_at(over) + outwards * gait.toe_out + variation * random.between(-1.5, 1.5) * degree;
       plant.toe = gait.path.beside(over, variation * random.between(-1, 1),
-                                   outwards * gait.half_width + variation * random.between(-0.7, 0.7)) +
+                                   outwards * gait.half_width - inside + variation * random.between(-0.7, 0.7)) +
                   build.foot.ankle_to_toe * forwards(plant.yaw);
       plant.strike = strike;
       plant.flat = strike + gait.flat * gait.stride_s;

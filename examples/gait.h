@@ -19,7 +19,7 @@ namespace kinespace::samples {
   return speed_m_s / std::sqrt(size_of(take));
 }
 
-// A line or an arc from the origin, travelled at constant speed.
+// The way of the hips: a line or an arc from the origin, travelled at constant speed.
 struct Path {
   double heading = 0;    // radians, at t = 0
   double speed = 0;      // cm/s

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include "examples/performance.h"
@@ -15,7 +16,8 @@ constexpr double longest_jump_reach = 0.955;  // fast knees stay clear of the si
 // The times and heights of a jump. Heights of the hips are against that of leaving and meeting the floor.
 struct JumpPlan {
   explicit JumpPlan(const JumpOptions& options, const Build& build)
-      : speed(std::sqrt(2 * gravity * options.rise_cm)),
+      : effort(std::min(1.0, std::sqrt(options.rise_cm / 30))),
+        speed(std::sqrt(2 * gravity * options.rise_cm)),
         flight_s(2 * speed / gravity),
         depth((0.19 + 0.0012 * options.rise_cm) * build.standing),
         push_s(1.9 * depth / speed),
@@ -29,7 +31,8 @@ struct JumpPlan {
         heading(options.take.heading_deg * degree),
         distance(100 * options.distance_m) {}
 
-  double speed;  // cm/s, upwards, when leaving the floor
+  double effort;  // 0 to 1: how far arms and ankles go
+  double speed;   // cm/s, upwards, when leaving the floor
   double flight_s;
   double depth;  // cm: how much lower the crouch is than the moment of leaving the floor
   double push_s;
@@ -77,26 +80,26 @@ FootTrack plan_foot(const JumpPlan& plan, const JumpOptions& options, const Buil
                 .fall = 4,
                 .in = 0.3,
                 .out = 0.3,
-                .peak_pitch = 62 * degree,
+                .peak_pitch = (20 + 42 * plan.effort) * degree,
                 .peak_after = 0.12,
                 .pitch_ready = 1,
                 .flight = rise};
   to.strike = plan.landing;
   to.flat = plan.landing + 0.09;
   to.heel_off = to.toe_off = plan.duration_s() + 100;
-  to.strike_pitch = 24 * degree;
+  to.strike_pitch = (6 + 18 * plan.effort) * degree;
   return {build.foot, {from, to}};
 }
 
 void swing_arms(BodyPose& pose, const JumpPlan& plan, double t) {
   const double flexion = Keys({{plan.start - 0.1, 2},
                                {plan.push - 0.3 * plan.crouch_s, -42},
-                               {plan.take_off + 0.2, 125},
-                               {plan.landing - 0.08, 95},
+                               {plan.take_off + 0.4 * plan.flight_s, 125},
+                               {plan.landing - 0.15 * plan.flight_s, 95},
                                {plan.lowest + 0.1, 15},
                                {plan.end + 0.1, 2}})(t);
   for (ArmAngles& arm : pose.arms) {
-    arm.flexion += flexion * degree;
+    arm.flexion += plan.effort * flexion * degree;
     arm.elbow += 16 * degree * plan.crouched(t);
   }
 }
@@ -117,7 +120,7 @@ BodyPose body_at(double t, const JumpPlan& plan, const Stance& stance, const Bui
 
 void JumpOptions::validate() const {
   take.validate();
-  require_range("rise_cm", rise_cm, 5, 60);
+  require_range("rise_cm", rise_cm, 10, 60);
   require_range("distance_m", distance_m, 0, 1.2);
 }
 

@@ -84,7 +84,7 @@ void swing_arms(BodyPose& pose, const RunOptions& options, double cycle, double 
   }
 }
 
-BodyPose body_at(double t, const RunOptions& options, const Gait& gait, const Build& build) {
+BodyPose body_at(double t, const RunOptions& options, const Gait& gait) {
   const double pace = pace_of(options);
   const double cycle = gait.angle(t) + 2 * pi * 0.04;  // pelvis and arms turn back in mid-air
   const double step_s = gait.stride_s / 2;
@@ -93,7 +93,7 @@ BodyPose body_at(double t, const RunOptions& options, const Gait& gait, const Bu
   const double bank = gait.path.bank();
   BodyPose pose;
   const double sway = 0.8 * size_of(options.take) * std::cos(gait.angle(t) - pi * gait.toe_off);
-  const Eigen::Vector2d place = gait.path.beside(t, 0, sway + std::tan(bank) * build.standing);
+  const Eigen::Vector2d place = gait.path.beside(t, 0, sway);
   pose.hips = {place.x(), bounce(step_time, step_s, gait.toe_off * gait.stride_s), place.y()};
   pose.heading = gait.path.heading_at(t);
   pose.pelvis = {.yaw = -mix(5, 10, pace) * degree * std::cos(cycle),
@@ -136,7 +136,7 @@ SampleMotion make_run(const RunOptions& options) {
   Random random(salted(options.take.seed, "run"));
   act.feet = plan_steps(gait, act.build, options.duration_s, random, options.take.variation);
   const Liveliness lively(random, options.take.variation);
-  act.body = [=, build = act.build](double t) { return lively(t, body_at(t, options, gait, build)); };
+  act.body = [=](double t) { return lively(t, body_at(t, options, gait)); };
   act.lift_hips(act.room_above(0, options.duration_s, longest_run_reach));
   return act.perform("run_" + options.style, {"run", options.style});
 }

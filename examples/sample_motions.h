@@ -128,7 +128,7 @@ struct RaiseOptions {
 
 // Stands, crouches, jumps off both feet, lands, stands. The hips fly a parabola.
 struct JumpOptions {
-  double rise_cm = 30;    // 5 to 60: of the hips, from leaving the floor to the top
+  double rise_cm = 30;    // 10 to 60: of the hips, from leaving the floor to the top
   double distance_m = 0;  // 0 to 1.2: forwards
   TakeOptions take = {};
   void validate() const;

@@ -66,7 +66,7 @@ void swing_arms(BodyPose& pose, const WalkOptions& options, double cycle, double
   }
 }
 
-BodyPose body_at(double t, const WalkOptions& options, const Gait& gait, const Build& build) {
+BodyPose body_at(double t, const WalkOptions& options, const Gait& gait) {
   const double pace = pace_of(options);
   const double cycle = gait.angle(t);            // 0 at the left strike, pi at the right one
   const double support = cycle - 2 * pi * 0.07;  // 0 in the middle of double support
@@ -75,7 +75,7 @@ BodyPose body_at(double t, const WalkOptions& options, const Gait& gait, const B
   const double surge = size * mix(0.3, 0.9, pace) * std::sin(2 * support);           // fastest in double support
   const double bank = gait.path.bank();
   BodyPose pose;
-  const Eigen::Vector2d place = gait.path.beside(t, surge, sway + std::tan(bank) * build.standing);
+  const Eigen::Vector2d place = gait.path.beside(t, surge, sway);
   pose.hips = {place.x(), -size * mix(1.2, 3.0, pace) * std::cos(2 * support), place.y()};
   pose.heading = gait.path.heading_at(t);
   pose.pelvis = {.yaw = -mix(3, 8, pace) * degree * std::cos(cycle),
@@ -119,7 +119,7 @@ SampleMotion make_walk(const WalkOptions& options) {
   Random random(salted(options.take.seed, "walk"));
   act.feet = plan_steps(gait, act.build, options.duration_s, random, options.take.variation);
   const Liveliness lively(random, options.take.variation);
-  act.body = [=, build = act.build](double t) { return lively(t, body_at(t, options, gait, build)); };
+  act.body = [=](double t) { return lively(t, body_at(t, options, gait)); };
   act.lift_hips(act.room_above(0, options.duration_s, longest_reach));
   return act.perform("walk_" + options.style, {"walk", options.style});
 }
