@@ -19,7 +19,8 @@
 namespace kinespace {
 namespace {
 
-constexpr double metres = 0.01;  // in a centimetre
+constexpr double metres = 0.01;             // in a centimetre
+constexpr std::size_t most_joints = 65536;  // a vertex names its joint in 16 bits
 
 // JSON holds UTF-8 only; what a file has else in a name becomes '?'.
 std::string utf8(const std::string& text) {
@@ -49,7 +50,7 @@ std::string utf8(const std::string& text) {
   return out;
 }
 
-[[noreturn]] void fail_too_long(const Clip& clip, const std::string& found) {
+[[noreturn]] void fail_too_large(const Clip& clip, const std::string& found) {
   throw Error(ErrorKind::bad_input, {.file = clip.name,
                                      .found = found,
                                      .expected = "a clip that one glTF file can hold",
@@ -165,6 +166,8 @@ class Writer {
   explicit Writer(const Clip& clip) : clip_(clip), arrays_(model_) {}
 
   tinygltf::Model write() && {
+    const std::size_t joints = clip_.skeleton.joints.size();
+    if (joints > most_joints) fail_too_large(clip_, std::to_string(joints) + " joints");
     model_.asset.version = "2.0";
     model_.asset.generator = "kinespace";
     add_nodes();
@@ -279,7 +282,7 @@ class Writer {
     for (int f = 0; f < clip_.frames; ++f) {
       const auto i = static_cast<std::size_t>(f);
       times[i] = static_cast<float>(f / clip_.rate_hz);
-      if (f > 0 && !(times[i] > times[i - 1])) fail_too_long(clip_, std::to_string(clip_.frames) + " frames");
+      if (f > 0 && !(times[i] > times[i - 1])) fail_too_large(clip_, std::to_string(clip_.frames) + " frames");
     }
     return arrays_.add_ranged(times, TINYGLTF_TYPE_SCALAR, 1);
   }
@@ -331,7 +334,7 @@ class Writer {
     constexpr double largest = 2e9;
     const double bytes = static_cast<double>(clip_.frames) * (4 + 16.0 * clip_.skeleton.joint_count() +
                                                               12 * static_cast<double>(clip_.translations.size()));
-    if (bytes > largest) fail_too_long(clip_, std::to_string(clip_.frames) + " frames");
+    if (bytes > largest) fail_too_large(clip_, std::to_string(clip_.frames) + " frames");
     const int times = add_times();
     tinygltf::Animation animation;
     animation.name = utf8(clip_.name);

@@ -23,8 +23,8 @@ enum class GltfForm {
   binary,  // .glb
 };
 
-// Throws Error{bad_input} when the clip is too long for one file: numbers of 2 GiB, or times that 32-bit floats cannot
-// tell apart (8 million frames).
+// Throws Error{bad_input} when the clip is too large for one file: 2 GB of numbers, times that 32-bit floats cannot
+// tell apart (8 million frames), 65536 joints.
 [[nodiscard]] std::string format_gltf(const Clip& clip, GltfForm form);
 
 // Binary when the path ends in .glb, else text. The file is whole or not there. Throws Error.

@@ -147,7 +147,7 @@ TEST(AsfBadInput, bones_that_are_not_whole) {
   expect_error(replaced(small_asf, "name femur", "name"), "name of several words or none", "one word", 25);
   expect_error(replaced(small_asf, "    name femur\n", ""), "without a name", "a name", 32);
   expect_error(replaced(small_asf, "    direction 0.6 -0.8 0\n", ""), "\"hip\" without direction or length", "both",
-               22);
+               21);
   expect_error(replaced(small_asf, "    length 2.5\n", ""), "\"hip\" without direction or length", "both", 21);
   expect_error(replaced(small_asf, "direction 0.6 -0.8 0", "direction 0.6 -0.8"), "too few", "direction", 19);
   expect_error(replaced(small_asf, "direction 0.6", "direction nan"), "\"nan\"", "direction", 19);

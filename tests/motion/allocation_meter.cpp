@@ -1,0 +1,61 @@
+#include "tests/motion/allocation_meter.h"
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include <malloc.h>
+
+namespace {
+
+std::atomic<std::size_t> in_use{0};
+std::atomic<std::size_t> peak{0};
+
+void* counted(void* memory) {
+  if (memory == nullptr) throw std::bad_alloc();
+  const std::size_t now = in_use += malloc_usable_size(memory);
+  std::size_t most = peak.load();
+  while (now > most && !peak.compare_exchange_weak(most, now)) {
+  }
+  return memory;
+}
+
+void uncounted(void* memory) noexcept {
+  if (memory == nullptr) return;
+  in_use -= malloc_usable_size(memory);
+  std::free(memory);
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return counted(std::malloc(size == 0 ? 1 : size));
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  const auto step = static_cast<std::size_t>(alignment);
+  return counted(std::aligned_alloc(step, (size + step - 1) / step * step));
+}
+void operator delete(void* memory) noexcept {
+  uncounted(memory);
+}
+void operator delete(void* memory, std::size_t) noexcept {
+  uncounted(memory);
+}
+void operator delete(void* memory, std::align_val_t) noexcept {
+  uncounted(memory);
+}
+void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
+  uncounted(memory);
+}
+
+namespace kinespace::test {
+
+AllocationMeter::AllocationMeter() : start_(in_use) {
+  peak = start_;
+}
+
+std::size_t AllocationMeter::peak_bytes() const {
+  return peak - start_;
+}
+
+}  // namespace kinespace::test
