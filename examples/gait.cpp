@@ -36,9 +36,11 @@ std::vector<FootTrack> plan_steps(const Gait& gait, const Build& build, double d
       const double strike = first_strike + i * gait.stride_s;
       const double over = strike + gait.under * gait.stride_s;
       Plant plant;
-      plant.yaw = gait.path.heading_at(over) + outwards * gait.toe_out + variation * random.between(-1.5, 1.5) * degree;
-      plant.toe = gait.path.beside(over, variation * random.between(-1, 1),
-                                   outwards * gait.half_width - inside + variation * random.between(-0.7, 0.7)) +
+      const double turned = variation * random.between(-1.5, 1.5) * degree;
+      const double ahead = variation * random.between(-1, 1);
+      const double aside = variation * random.between(-0.7, 0.7);
+      plant.yaw = gait.path.heading_at(over) + outwards * gait.toe_out + turned;
+      plant.toe = gait.path.beside(over, ahead, outwards * gait.half_width - inside + aside) +
                   build.foot.ankle_to_toe * forwards(plant.yaw);
       plant.strike = strike;
       plant.flat = strike + gait.flat * gait.stride_s;

@@ -16,6 +16,8 @@ namespace {
 // q and -q are the same rotation; the one nearer to the frame before lets the tracks run on smoothly.
 void keep_hemisphere(Clip& clip) {
   for (int joint = 0; joint < clip.skeleton.joint_count(); ++joint) {
+    const Eigen::Quaterniond first = clip.rotation(joint, 0);
+    if (first.w() < 0) clip.set_rotation(joint, 0, Eigen::Quaterniond(-first.coeffs()));
     for (int f = 1; f < clip.frames; ++f) {
       const Eigen::Quaterniond q = clip.rotation(joint, f);
       if (q.dot(clip.rotation(joint, f - 1)) < 0) clip.set_rotation(joint, f, Eigen::Quaterniond(-q.coeffs()));

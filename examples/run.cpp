@@ -45,12 +45,12 @@ Gait gait_of(const RunOptions& options, const Build& build) {
   gait.half_width = 0.35 * build.left_hip.x();
   gait.toe_out = 5 * degree;
   gait.strike_pitch = -6 * degree;
-  gait.swing = {.lift = size_of(options.take) * mix(14, 30, pace),
+  gait.swing = {.lift = size_of(options.take) * mix(7, 19, pace),
                 .rise = 3,
                 .fall = 4.5,
                 .in = 0.45,
                 .out = 0.4,
-                .peak_pitch = mix(72, 100, pace) * degree,
+                .peak_pitch = mix(64, 92, pace) * degree,
                 .peak_after = 0.22,
                 .pitch_ready = 0.85,
                 .flight = 0};

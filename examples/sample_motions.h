@@ -15,7 +15,8 @@
 //
 // Units in options: metres per second, degrees, seconds, centimetres for lengths of the body. Clips are in the
 // library's units (clip.h). Heading 0 faces +Z; positive headings and turns go to the left (+X), as rotations about +Y
-// do. Every function gives the same clip for the same options on the same machine.
+// do. Bodies of other heights move as one of 175 cm does at the same Froude number v^2 / (g height). Every function
+// gives the same clip for the same options on the same machine.
 #pragma once
 
 #include <cstdint>
@@ -65,7 +66,7 @@ struct TakeOptions {
   double height_cm = 175;  // 100 to 220: the walker's
   double heading_deg = 0;  // -360 to 360: where the walker faces first
   std::uint64_t seed = 1;  // draws the small variation: another seed is another take
-  double variation = 1;    // 0 to 1: how much foot placement, timing of limbs and posture vary; 0: none
+  double variation = 1;    // 0 to 1: how much foot placement, arm swing and posture vary; 0: none
   void validate() const;   // throws Error{usage} naming the field, its value and its range; so do all below
 };
 

@@ -272,7 +272,7 @@ TEST(SampleBody, rotations_are_unit_and_continuous) {
 TEST(SampleBody, accelerations_stay_within_what_bodies_do) {
   for (const SampleMotion& motion : library()) {
     const std::string& content = motion.labels.front();
-    const double bound = content == "walk" ? 100 : content == "run" ? 130 : content == "jump" ? 190 : 40;
+    const double bound = content == "walk" ? 90 : content == "run" ? 100 : content == "jump" ? 190 : 40;
     EXPECT_LT(greatest_acceleration(motion.clip), bound) << motion.clip.name;
   }
 }
