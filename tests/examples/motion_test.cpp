@@ -241,6 +241,27 @@ TEST(SampleBody, knees_bend_forwards_and_elbows_inwards) {
   }
 }
 
+// The same in the world: the knee is before the line from hip to ankle, the fist of a runner before the elbow.
+TEST(SampleBody, knees_point_where_the_body_faces) {
+  for (const SampleMotion& motion : all_motions()) {
+    const JointPositions p = joint_positions(motion.clip);
+    const auto at = [&](int f, const std::string& name) { return p.at(f, joint(motion.clip, name)); };
+    double knee_ahead = 100;
+    double fist_ahead = 100;
+    for (int f = 0; f < motion.clip.frames; ++f) {
+      const Eigen::Vector3d front = motion.clip.rotation(0, f) * Eigen::Vector3d::UnitZ();
+      for (const std::string side : {"Left", "Right"}) {
+        const Eigen::Vector3d leg = (at(f, side + "Foot") - at(f, side + "UpLeg")).normalized();
+        const Eigen::Vector3d knee = at(f, side + "Leg") - at(f, side + "UpLeg");
+        knee_ahead = std::min(knee_ahead, (knee - knee.dot(leg) * leg).dot(front));
+        fist_ahead = std::min(fist_ahead, (at(f, side + "Hand") - at(f, side + "ForeArm")).dot(front));
+      }
+    }
+    EXPECT_GT(knee_ahead, 2) << motion.clip.name;
+    EXPECT_TRUE(motion.labels.front() != "run" || fist_ahead > 5) << motion.clip.name;
+  }
+}
+
 TEST(SampleBody, bones_keep_their_length) {
   for (const SampleMotion& motion : library()) {
     const JointPositions p = joint_positions(motion.clip);
