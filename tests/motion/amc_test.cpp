@@ -93,7 +93,9 @@ TEST(Amc, line_ends_comments_and_the_first_frame_number_do_not_matter) {
   std::string crlf;
   for (const char c : small_amc) crlf += c == '\n' ? std::string(" \r\n") : std::string(1, c);
   const std::string later = replaced(replaced(small_amc, "\n1\n", "\n31\n"), "\n2\n", "\n# half\n\n 32\n");
-  for (const std::string& text : {crlf, later, std::string(small_amc.substr(0, small_amc.size() - 1))}) {
+  std::string cr(small_amc);
+  std::ranges::replace(cr, '\n', '\r');
+  for (const std::string& text : {crlf, cr, later, std::string(small_amc.substr(0, small_amc.size() - 1))}) {
     EXPECT_EQ(parse(text).rotations, plain.rotations);
   }
 }
@@ -144,6 +146,11 @@ TEST(AmcBadInput, frames_out_of_order_or_none) {
   expect_error("#!OML\n:FULLY-SPECIFIED\n", 3, "no frame", "at least one");
   expect_error("1\n", 2, "no values of bone \"root\"", "every frame");
   expect_error(replaced(small_amc, ":DEGREES", ":SAMPLES-PER-SECOND 0"), 3, "\"0\"", "a rate");
+}
+
+TEST(AmcBadInput, line_ends_of_several_kinds) {
+  const std::string frame = "root 1 18 -2 10 20 30\rfemur 5 -6 7.5\rtibia 25";
+  expect_error("1\r" + frame + "\n2\r" + frame + "\r3\r" + frame + "\n", 9, "line ends of several kinds", "the same");
 }
 
 TEST(AmcBadInput, a_file_of_frame_numbers_only_costs_no_memory) {
