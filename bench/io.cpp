@@ -149,7 +149,7 @@ BenchResult linearity(const Corpus& corpus) {
           .data = fmt::format("n = {}", clip.frames * times),
           .value = ratio,
           .unit = "",
-          .bar = 2.3};
+          .bar = 2.5};
 }
 
 Clip through_bvh(const Clip& clip) {
