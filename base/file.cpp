@@ -7,6 +7,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -69,17 +70,32 @@ void write_all(int fd, std::string_view content, const std::filesystem::path& pa
   }
 }
 
-// The permissions a plain open() would have given: 0666 less the umask.
-mode_t default_mode() {
-  const mode_t mask = ::umask(0);
-  ::umask(mask);
-  return static_cast<mode_t>(0666 & ~mask);
+// A new file beside the target, under a short name so that any target's name leaves room for it. Opened plainly, so that
+// its permissions are those of any new file.
+int create_temporary(const std::filesystem::path& folder, std::string& name) {
+  static std::atomic<unsigned> count{0};
+  for (;;) {
+    name = (folder / fmt::format(".kinespace-{}-{}", ::getpid(), count++)).string();
+    const int fd = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd >= 0 || errno != EEXIST) return fd;
+  }
+}
+
+// A terminal, a pipe, /dev/null: nothing to replace, and nothing that may be replaced.
+bool write_to_device(const std::filesystem::path& path, std::string_view content) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0 || S_ISREG(status.st_mode) || S_ISDIR(status.st_mode)) return false;
+  const Descriptor fd(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (fd.get() < 0) fail(ErrorKind::machine, path, "cannot open", errno, "check its permissions");
+  write_all(fd.get(), content, path);
+  return true;
 }
 
 }  // namespace
 
 MappedFile::MappedFile(const std::filesystem::path& path) {
-  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  // Non-blocking: opening a pipe that nobody writes to would wait for ever.
+  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (fd.get() < 0) {
     fail(ErrorKind::bad_input, path, "cannot open", errno, "check the path and its permissions");
   }
@@ -110,20 +126,27 @@ MappedFile& MappedFile::operator=(MappedFile&& other) noexcept {
 }
 
 void write_file_atomically(const std::filesystem::path& path, std::string_view content) {
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
-  std::string name = (folder / ("." + path.filename().string() + ".XXXXXX")).string();
-  Descriptor fd(::mkstemp(name.data()));
+  if (write_to_device(path, content)) return;
+  std::error_code code;
+  std::filesystem::path target = std::filesystem::weakly_canonical(std::filesystem::absolute(path), code);
+  if (code) target = std::filesystem::absolute(path);
+  const std::filesystem::path folder = target.parent_path();
+  std::string name;
+  Descriptor fd(create_temporary(folder, name));
   if (fd.get() < 0) {
     fail(ErrorKind::machine, path, "cannot create a file in " + folder.string(), errno,
          "check that the folder exists and is writable");
   }
   TemporaryName temporary(name);
   write_all(fd.get(), content, path);
-  if (::fchmod(fd.get(), default_mode()) != 0 || ::fsync(fd.get()) != 0) {
+  // A file that was there keeps its permissions.
+  struct stat old {};
+  if (::stat(target.c_str(), &old) == 0) ::fchmod(fd.get(), old.st_mode & 07777);
+  if (::fsync(fd.get()) != 0) {
     fail(ErrorKind::machine, path, "cannot flush", errno, "free some space or choose another place");
   }
   if (::close(fd.release()) != 0) fail(ErrorKind::machine, path, "cannot close", errno, "");
-  if (::rename(name.c_str(), path.c_str()) != 0) {
+  if (::rename(name.c_str(), target.c_str()) != 0) {
     fail(ErrorKind::machine, path, "cannot replace the file", errno, "check that it is a file and writable");
   }
   temporary.keep();
