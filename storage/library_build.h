@@ -3,7 +3,8 @@
 // Beside the target LIB.kspace stand while it is built
 //   LIB.kspace.partial   what was imported so far, committed in batches. It survives a kill, and the next build with
 //   the
-//                        same fingerprint goes on from there. Its lock keeps two builds of one library apart.
+//                        same fingerprint goes on from there. A power cut may cost it: then it is found to be damaged
+//                        and the build starts over. Its lock keeps two builds of one library apart.
 //   LIB.kspace.new       the library's rows, once library() was called. Worth nothing after a kill; made anew.
 // finish() flushes the new file to the disk, renames it over the target and removes the partial one, so a reader sees
 // the old library or the new one; a process that has the old one open keeps reading it. Extending starts from a copy of

@@ -28,12 +28,8 @@ class LibraryDamage : public testing::Test {
   }
 
   bool survives_as(std::span<const std::byte> bytes) {
-    // Written plainly and anew: flushing thousands of files to the disk would take minutes, and so does overwriting.
     const auto path = folder_ / "bad.kspace";
-    std::filesystem::remove(path);
-    std::FILE* file = std::fopen(path.c_str(), "wb");
-    EXPECT_EQ(std::fwrite(bytes.data(), 1, bytes.size(), file), bytes.size());
-    std::fclose(file);
+    test::write_unflushed(path, bytes);
     return survives(path);
   }
 

@@ -2,6 +2,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <fstream>
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -123,6 +124,13 @@ bool survives(const std::filesystem::path& path) {
     EXPECT_EQ(error.kind(), ErrorKind::bad_input) << error.what();
     return false;
   }
+}
+
+void write_unflushed(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  std::filesystem::remove(path);  // some file systems flush a file that is overwritten
+  std::ofstream out(path, std::ios::binary);
+  out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  EXPECT_TRUE(out.good());
 }
 
 int in_child(const std::function<int()>& act) {

@@ -30,6 +30,9 @@ void read_everything(const Library& library);
 // Returns whether nothing was thrown.
 bool survives(const std::filesystem::path& path);
 
+// Writes a file anew without flushing it to the disk, as a test that writes thousands must.
+void write_unflushed(const std::filesystem::path& path, std::span<const std::byte> bytes);
+
 // Runs `act` in a process of its own and returns its exit status, or 128 + the signal that ended it. The status is that
 // of `act`, or the kind of the Error that escaped from it.
 int in_child(const std::function<int()>& act);
