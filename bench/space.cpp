@@ -49,6 +49,7 @@ struct ClipFigures {
   double error_sum = 0;
   double error_count = 0;
   double worst = 0;
+  int worst_frame = 0;
   std::vector<float> cut_changes;   // change of joint speed at cuts, cm/s
   std::vector<float> other_changes;
 };
@@ -60,7 +61,10 @@ ClipFigures measure(const MotionSpace& space, const Clip& clip, const EncodedCli
   for (std::size_t i = 0; i < original.values.size(); ++i) {
     const double e = (original.values[i] - decoded.values[i]).norm();
     out.error_sum += e;
-    out.worst = std::max(out.worst, e);
+    if (e > out.worst) {
+      out.worst = e;
+      out.worst_frame = static_cast<int>(i) / original.joints;
+    }
   }
   out.error_count = static_cast<double>(original.values.size());
   std::vector<char> at_cut(static_cast<std::size_t>(clip.frames), 0);
@@ -85,6 +89,7 @@ ClipFigures measure(const MotionSpace& space, const Clip& clip, const EncodedCli
 struct Figures {
   double mean = 0;
   double worst = 0;
+  std::string worst_place;  // clip and frame
   double jump_ratio = 0;
 };
 
@@ -97,10 +102,14 @@ Figures measure(const DataSet& data, const MotionSpace& space, const std::vector
   double count = 0;
   float largest = 0;
   std::vector<float> others;
-  for (const ClipFigures& part : parts) {
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const ClipFigures& part = parts[i];
     sum += part.error_sum;
     count += part.error_count;
-    out.worst = std::max(out.worst, part.worst);
+    if (part.worst > out.worst) {
+      out.worst = part.worst;
+      out.worst_place = fmt::format("{}, frame {}", data.clips[i].name, part.worst_frame);
+    }
     for (const float c : part.cut_changes) largest = std::max(largest, c);
     others.insert(others.end(), part.other_changes.begin(), part.other_changes.end());
   }
@@ -161,8 +170,8 @@ void level_of_detail_rows(const DataSet& data, const Bars& bars, const Compute& 
   add("mean joint error, 5 functions", five.mean, "cm", bars.at_5);
   add("mean joint error, 10 functions", ten.mean, "cm", bars.at_10);
   add(fmt::format("mean joint error, all {} functions", built.space.functions()), all.mean, "cm", bars.at_all);
-  add("worst joint error, 5 functions", five.worst, "cm", {});
-  add("worst joint error, 10 functions", ten.worst, "cm", 15);
+  add("worst joint error, 5 functions (" + five.worst_place + ")", five.worst, "cm", {});
+  add("worst joint error, 10 functions (" + ten.worst_place + ")", ten.worst, "cm", 15);
   add("jump at cuts, 5 functions", five.jump_ratio, "x p99.9 elsewhere", 1.0);
   add("jump at cuts, 10 functions", ten.jump_ratio, "x p99.9 elsewhere", {});
   add("jump at cuts, all functions", all.jump_ratio, "x p99.9 elsewhere", {});

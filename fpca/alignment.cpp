@@ -31,10 +31,14 @@ void AlignmentOptions::validate() const {
 }
 
 WarpSearch::WarpSearch(const MotionSpace& space, const AlignmentOptions& options)
-    : options_(options), curves_(space.curves()), mean_(search_points), root_weight_(search_points) {
+    : options_(options), curves_(space.curves()),
+      mean_(search_points),
+      root_weight_(search_points),
+      curve_weight_(curve_weights(space.skeleton()).cast<float>()) {
   options_.validate();
   const FunctionGroup& group = space.groups().front();
-  const Eigen::Index n = std::min<Eigen::Index>(options_.functions, group.functions.cols());
+  const Eigen::Index n = std::min<Eigen::Index>(2 * options_.functions, group.functions.cols());
+  coarse_ = std::min<Eigen::Index>(options_.functions, n);
   SampleMatrix columns(space.points(), n + 1);
   columns << group.mean, group.functions.leftCols(n);
   const UniformSpline spline(std::move(columns));
@@ -54,7 +58,7 @@ WarpSearch::WarpSearch(const MotionSpace& space, const AlignmentOptions& options
 
 WarpSearch::Scratch WarpSearch::prepare(const RunSampler& run, int first, int last) const {
   Scratch scratch;
-  scratch.own = run.sample(first, last, Warp(), own_time_points).cast<float>();
+  scratch.own = run.sample(first, last, Warp(), own_time_points).cast<float>().array().rowwise() * curve_weight_.array();
   scratch.projection.resize(functions_.cols(), curves_);
   scratch.row.resize(curves_);
   return scratch;
@@ -69,11 +73,15 @@ double WarpSearch::residual(Scratch& scratch, const Warp& warp) const {
     const auto k = std::min(static_cast<Eigen::Index>(x), static_cast<Eigen::Index>(own_time_points - 2));
     const auto b = static_cast<float>(x - static_cast<double>(k)) * root_weight_(i);
     const float a = root_weight_(i) - b;
-    scratch.row = (a * scratch.own.row(k) + b * scratch.own.row(k + 1)).array() - mean_(i);
+    scratch.row = a * scratch.own.row(k) + b * scratch.own.row(k + 1) - mean_(i) * curve_weight_;
     total += static_cast<double>(scratch.row.squaredNorm());
     for (Eigen::Index f = 0; f < functions_.cols(); ++f) scratch.projection.row(f) += functions_(i, f) * scratch.row;
   }
-  return std::max(0.0, total - static_cast<double>(scratch.projection.squaredNorm()));
+  const double fine = total - static_cast<double>(scratch.projection.squaredNorm());
+  const double coarse = total - static_cast<double>(scratch.projection.topRows(coarse_).squaredNorm());
+  // Float sums leave a floor, below which nothing is gained.
+  const double floor = 1e-7 * total + 1e-12;
+  return std::sqrt(std::max(fine, floor) * std::max(coarse, floor));
 }
 
 double WarpSearch::residual(const RunSampler& run, int first, int last, const Warp& warp) const {
@@ -83,17 +91,17 @@ double WarpSearch::residual(const RunSampler& run, int first, int last, const Wa
 
 std::pair<double, Warp> WarpSearch::descend(Scratch& scratch, Warp warp) const {
   double best = residual(scratch, warp);
-  for (const int step : {16, 8, 4}) {
+  for (const int step : {12, 6, 3, 1}) {
     for (bool moved = true; moved;) {
       moved = false;
-      for (std::size_t k = 0; k < Warp::knot_count; ++k) {
+      for (std::size_t k = 0; k < Warp::terms; ++k) {
         for (const int sign : {-1, 1}) {
-          Warp::Knots knots = warp.knots();
-          const int value = knots[k] + sign * step;
-          if (value < 0 || value >= Warp::steps) continue;
-          knots[k] = static_cast<std::uint8_t>(value);
-          if (!Warp::legal(knots)) continue;
-          const Warp candidate(knots);
+          Warp::Coefficients coefficients = warp.coefficients();
+          const int value = coefficients[k] + sign * step;
+          if (value < -127 || value > 127) continue;
+          coefficients[k] = static_cast<std::int8_t>(value);
+          if (!Warp::legal(coefficients)) continue;
+          const Warp candidate(coefficients);
           const double r = residual(scratch, candidate);
           if (r < best) {
             best = r;
@@ -122,6 +130,28 @@ Warp WarpSearch::best(const RunSampler& run, int first, int last, std::span<cons
   return least < (1 - options_.least_gain) * plain ? warp : Warp();
 }
 
+Eigen::RowVectorXd curve_weights(const Skeleton& skeleton) {
+  constexpr double velocity_weight_s = 0.1;  // an error of the velocity lasts about so long before it turns
+  const CurveLayout layout = curve_layout(skeleton);
+  Eigen::RowVectorXd out(layout.curve_count());
+  out.head<3>().setConstant(velocity_weight_s);
+  for (int k = 0; k < layout.joint_count(); ++k) {
+    const int above = layout.joints[static_cast<std::size_t>(k)];
+    std::vector<double> reach(skeleton.joints.size(), -1);  // metres below `above`; negative: not below it
+    reach[static_cast<std::size_t>(above)] = 0;
+    double squares = 0;
+    for (int j = above + 1; j < skeleton.joint_count(); ++j) {
+      const Joint& joint = skeleton.joints[static_cast<std::size_t>(j)];
+      const double parent = reach[static_cast<std::size_t>(joint.parent)];
+      if (parent < 0) continue;
+      reach[static_cast<std::size_t>(j)] = parent + joint.offset.norm() / 100;
+      squares += reach[static_cast<std::size_t>(j)] * reach[static_cast<std::size_t>(j)];
+    }
+    out.segment<4>(3 + 4 * k).setConstant(2 * std::sqrt(squares / skeleton.joint_count()));
+  }
+  return out;
+}
+
 TemplateGroups group_sequences(const Eigen::MatrixXf& vectors, int count) {
   TemplateGroups out;
   const Eigen::Index n = vectors.rows();
@@ -146,18 +176,18 @@ TemplateGroups group_sequences(const Eigen::MatrixXf& vectors, int count) {
 }
 
 Warp warp_of_path(std::span<const FramePair> path, int template_frames, int own_frames) {
-  std::array<double, Warp::knot_count> knots{};
+  std::array<double, Warp::terms> own_times{};
   std::size_t at = 0;
-  for (std::size_t k = 0; k < knots.size(); ++k) {
-    const double wanted = static_cast<double>(k + 1) / (Warp::knot_count + 1) * (template_frames - 1);
+  for (std::size_t k = 0; k < own_times.size(); ++k) {
+    const double wanted = static_cast<double>(k + 1) / (Warp::terms + 1) * (template_frames - 1);
     while (at + 1 < path.size() && path[at].query < wanted) ++at;
     // All own frames matched to that template frame count, so take their middle.
     std::size_t end = at;
     while (end + 1 < path.size() && path[end + 1].query == path[at].query) ++end;
     const double own = (path[at].target + path[end].target) / 2.0;
-    knots[k] = own_frames > 1 ? own / (own_frames - 1) : 0;
+    own_times[k] = own_frames > 1 ? own / (own_frames - 1) : 0;
   }
-  return Warp::nearest(knots);
+  return Warp::through(own_times);
 }
 
 }  // namespace kinespace

@@ -241,7 +241,7 @@ BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& opt
   std::vector<std::vector<Warp>> warps;
   if (options.align && options.alignment.rounds > 0) {
     // Aligned for the functions that all curves share, whatever the grouping of the result.
-    MotionSpace pooled(found.skeleton, {.functions = options.alignment.functions}, points);
+    MotionSpace pooled(found.skeleton, {.functions = 2 * options.alignment.functions}, points);
     pooled.set_references(references);
     pooled.fit(gather_moments(clips, pooled, {}, progress, "analyse"), compute);
     const auto proposals = propose_warps(clips, pooled, options.alignment, compute, progress);
@@ -262,6 +262,26 @@ BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& opt
   space.fit(gather_moments(clips, space, warps, progress, "analyse"), compute);
   if (warps.empty()) warps.resize(static_cast<std::size_t>(clips.count));
   return {std::move(space), std::move(warps)};
+}
+
+BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips, const SpaceBuildOptions& options,
+                        const Compute& compute, const Progress& progress) {
+  options.validate();
+  std::vector<std::vector<Warp>> warps(static_cast<std::size_t>(clips.count));
+  // Functions of all curves together are what warps are searched against; spaces of other groupings take clips as they are.
+  if (options.align && options.alignment.rounds > 0 && space.options().grouping == Grouping::all_together) {
+    const WarpSearch search(space, options.alignment);
+    for_each_clip<std::vector<Warp>>(
+        clips, progress, "align",
+        [&](int, const PreparedClip& clip) { return align_prepared(search, space, clip, {}); },
+        [&](int i, std::vector<Warp>& w) { warps[static_cast<std::size_t>(i)] = std::move(w); });
+  }
+  std::vector<CurveMoments> moments = space.moments();
+  merge_into(moments, gather_moments(clips, space, warps, progress, "analyse"));
+  MotionSpace extended(space.skeleton(), space.options(), space.points());
+  extended.set_references(space.references());
+  extended.fit(std::move(moments), compute);
+  return {std::move(extended), std::move(warps)};
 }
 
 OrientationMoments::OrientationMoments(int joints) : sums_(static_cast<std::size_t>(joints), Eigen::Matrix4d::Zero()) {}

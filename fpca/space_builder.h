@@ -52,6 +52,11 @@ struct BuiltSpace {
 [[nodiscard]] BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& options,
                                      const Compute& compute = {}, const Progress& progress = {});
 
+// The space with more clips in it: the moments of the new clips (aligned to the functions that are there) are merged into
+// the space's own, exactly, and the functions found anew. Grid, references, grouping and options stay those of `space`.
+[[nodiscard]] BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips, const SpaceBuildOptions& options,
+                                      const Compute& compute = {}, const Progress& progress = {});
+
 // The main axis of sum q q' for each joint (markley 2007), canonical sign: largest entry positive. 4 x J.
 class OrientationMoments {
  public:

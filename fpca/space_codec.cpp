@@ -101,7 +101,7 @@ Bytes pack_sequences(const EncodedClip& clip) {
     put_varint(out, static_cast<std::uint64_t>(run.sequences.front().first));
     for (const EncodedSequence& s : run.sequences) {
       put_varint(out, static_cast<std::uint64_t>(s.last - s.first));
-      for (const std::uint8_t knot : s.warp.knots()) out.put(knot);
+      for (const std::int8_t a : s.warp.coefficients()) out.put(a);
     }
   }
   return std::move(out).take();
@@ -113,18 +113,18 @@ void unpack_sequences(ByteReader in, EncodedClip& clip) {
   std::int64_t next = 0;
   for (std::size_t r = 0; r < runs; ++r) {
     EncodedRun& run = clip.runs.emplace_back();
-    const std::size_t count = get_count(in, 1 + Warp::knot_count, "sequences");
+    const std::size_t count = get_count(in, 1 + Warp::terms, "sequences");
     const std::uint64_t first = get_varint(in);
     if (count == 0 || first != static_cast<std::uint64_t>(next)) in.fail("a run out of place", "runs that follow each other");
     std::int64_t at = next;
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint64_t length = get_varint(in);
       if (length > static_cast<std::uint64_t>(clip.frames)) in.fail("a sequence beyond the clip's end", "frames of the clip");
-      Warp::Knots knots{};
-      for (std::uint8_t& knot : knots) knot = in.get<std::uint8_t>();
-      if (!Warp::legal(knots)) in.fail("a time warp that is not monotone", "slopes within [1/2, 2]");
+      Warp::Coefficients coefficients{};
+      for (std::int8_t& a : coefficients) a = in.get<std::int8_t>();
+      if (!Warp::legal(coefficients)) in.fail("a time warp that is not monotone", "slopes within [1/2, 2]");
       EncodedSequence s{.first = static_cast<int>(at), .last = static_cast<int>(at + static_cast<std::int64_t>(length)),
-                        .warp = Warp(knots)};
+                        .warp = Warp(coefficients)};
       at = s.last;
       if (at >= clip.frames || (length == 0 && count > 1)) in.fail("a sequence beyond the clip's end", "frames of the clip");
       run.sequences.push_back(std::move(s));
@@ -143,7 +143,7 @@ Bytes pack_side(const EncodedClip& clip) {
     out.put_array(std::span<const float>(run.start.data(), 3));
     for (const EncodedSequence& s : run.sequences) out.put_array(std::span<const float>(s.travel.data(), 3));
   }
-  out.put_array(std::span<const std::byte>(pack_side_tracks(clip.side_tracks)));
+  out.put_bytes(pack_side_tracks(clip.side_tracks));
   return std::move(out).take();
 }
 
@@ -323,10 +323,10 @@ Bytes pack_prepared(const PreparedClip& clip) {
   }
   const Bytes skeleton = pack_skeleton(clip.skeleton);
   put_varint(out, skeleton.size());
-  out.put_array(std::span<const std::byte>(skeleton));
+  out.put_bytes(skeleton);
   const Bytes tracks = pack_side_tracks(clip.curves.side_tracks);
   put_varint(out, tracks.size());
-  out.put_array(std::span<const std::byte>(tracks));
+  out.put_bytes(tracks);
   const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values = clip.curves.values.cast<float>();
   out.put_array(std::span<const float>(values.data(), static_cast<std::size_t>(values.size())));
   return one_section("prepared-clip", "clip", std::move(out).take());

@@ -1,95 +1,92 @@
 #include "fpca/warp.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "base/error.h"
 
 namespace kinespace {
 namespace {
 
-constexpr int pieces = Warp::knot_count + 1;
-constexpr double width = 1.0 / pieces;
-constexpr int shallowest = Warp::steps / pieces / 2;  // steps between knots at slope 1/2
-constexpr int steepest = Warp::steps / pieces * 2;    // and at slope 2
-constexpr Warp::Knots identity_knots{64, 128, 192};
+using std::numbers::pi;
 
-struct Place {
-  std::size_t piece;
-  double t;  // within the piece, [0, 1]
-};
+constexpr int slope_checks = 64;
 
-Place place_of(double s) {
-  const double scaled = std::clamp(s, 0.0, 1.0) * pieces;
-  const auto piece = std::min(static_cast<std::size_t>(scaled), static_cast<std::size_t>(pieces - 1));
-  return {piece, scaled - static_cast<double>(piece)};
+double slope_of(const Warp::Coefficients& coefficients, double s) {
+  double sum = 1;
+  for (std::size_t k = 0; k < coefficients.size(); ++k) {
+    sum += coefficients[k] * std::cos(static_cast<double>(k + 1) * pi * s) / Warp::steps;
+  }
+  return sum;
+}
+
+// cos(k pi i / slope_checks), once: legality is asked for in the innermost loop of the alignment.
+using CosineTable = std::array<std::array<float, Warp::terms>, slope_checks + 1>;
+CosineTable cosine_table() {
+  CosineTable out{};
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    for (std::size_t k = 0; k < Warp::terms; ++k) {
+      out[i][k] = static_cast<float>(std::cos(static_cast<double>((k + 1) * i) * pi / slope_checks) / Warp::steps);
+    }
+  }
+  return out;
 }
 
 }  // namespace
 
-Warp::Warp() : Warp(identity_knots) {}
-
-Warp::Warp(const Knots& knots) : knots_(knots) {
-  if (!legal(knots)) {
+Warp::Warp(const Coefficients& coefficients) : coefficients_(coefficients) {
+  if (!legal(coefficients)) {
     throw Error(ErrorKind::bad_input, {.found = "a time warp with a slope outside [1/2, 2]", .expected = "a legal warp"});
   }
-  value_.front() = 0;
-  value_.back() = 1;
-  for (std::size_t k = 0; k < knots.size(); ++k) value_[k + 1] = static_cast<double>(knots[k]) / steps;
-  std::array<double, pieces> secant{};
-  for (std::size_t k = 0; k < secant.size(); ++k) secant[k] = (value_[k + 1] - value_[k]) / width;
-  // Harmonic means keep the cubic monotone for any secants of one sign (Fritsch and Butland 1984).
-  tangent_.front() = secant.front();
-  tangent_.back() = secant.back();
-  for (std::size_t k = 1; k < secant.size(); ++k) {
-    tangent_[k] = 2 * secant[k - 1] * secant[k] / (secant[k - 1] + secant[k]);
-  }
 }
 
-bool Warp::legal(const Knots& knots) {
-  int before = 0;
-  for (std::size_t k = 0; k <= knots.size(); ++k) {
-    const int value = k < knots.size() ? knots[k] : steps;
-    if (value - before < shallowest || value - before > steepest) return false;
-    before = value;
-  }
-  return true;
+bool Warp::legal(const Coefficients& coefficients) {
+  static const CosineTable table = cosine_table();
+  return std::ranges::all_of(table, [&](const auto& cosines) {
+    float slope = 1;
+    for (std::size_t k = 0; k < cosines.size(); ++k) slope += static_cast<float>(coefficients[k]) * cosines[k];
+    return slope >= 0.5F && slope <= 2.0F;
+  });
 }
 
-Warp Warp::nearest(const std::array<double, knot_count>& values) {
-  Knots knots{};
-  int before = 0;
-  for (std::size_t k = 0; k < knots.size(); ++k) {
-    const int left = pieces - 1 - static_cast<int>(k);  // pieces still to come
-    const int low = std::max(before + shallowest, steps - left * steepest);
-    const int high = std::min(before + steepest, steps - left * shallowest);
-    const int wanted = static_cast<int>(std::lround(std::clamp(values[k], 0.0, 1.0) * steps));
-    before = std::clamp(wanted, low, high);
-    knots[k] = static_cast<std::uint8_t>(before);
+Warp Warp::through(const std::array<double, terms>& own_times) {
+  Eigen::Matrix<double, terms, terms> system;
+  Eigen::Vector<double, terms> offset;
+  for (int i = 0; i < terms; ++i) {
+    const double s = (i + 1.0) / (terms + 1);
+    for (int k = 0; k < terms; ++k) system(i, k) = std::sin((k + 1) * pi * s) / ((k + 1) * pi);
+    offset(i) = own_times[static_cast<std::size_t>(i)] - s;
   }
-  return Warp(knots);
+  const Eigen::Vector<double, terms> a = system.partialPivLu().solve(offset);
+  for (double part = 1; part > 0.05; part -= 0.1) {
+    Coefficients coefficients{};
+    for (int k = 0; k < terms; ++k) {
+      coefficients[static_cast<std::size_t>(k)] =
+          static_cast<std::int8_t>(std::clamp(std::lround(part * a(k) * steps), -127L, 127L));
+    }
+    if (legal(coefficients)) return Warp(coefficients);
+  }
+  return {};
 }
-
-bool Warp::is_identity() const { return knots_ == identity_knots; }
 
 double Warp::own_time(double s) const {
-  const auto [k, t] = place_of(s);
-  const double t2 = t * t;
-  const double t3 = t2 * t;
-  return value_[k] * (2 * t3 - 3 * t2 + 1) + value_[k + 1] * (3 * t2 - 2 * t3) +
-         width * (tangent_[k] * (t3 - 2 * t2 + t) + tangent_[k + 1] * (t3 - t2));
+  double sum = s;
+  for (std::size_t k = 0; k < coefficients_.size(); ++k) {
+    if (coefficients_[k] == 0) continue;
+    const double w = static_cast<double>(k + 1) * pi;
+    sum += coefficients_[k] * std::sin(w * s) / (w * steps);
+  }
+  return sum;
 }
 
-double Warp::slope(double s) const {
-  const auto [k, t] = place_of(s);
-  const double t2 = t * t;
-  return (value_[k + 1] - value_[k]) / width * (6 * t - 6 * t2) + tangent_[k] * (3 * t2 - 4 * t + 1) +
-         tangent_[k + 1] * (3 * t2 - 2 * t);
-}
+double Warp::slope(double s) const { return slope_of(coefficients_, s); }
 
 double Warp::space_time(double u) const {
   if (u <= 0) return 0;
   if (u >= 1) return 1;
+  if (is_identity()) return u;
   double low = 0;
   double high = 1;
   double s = u;

@@ -1,0 +1,338 @@
+#include "fpca/library_builder.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "fpca/library_view.h"
+#include "fpca/space_codec.h"
+#include "motion/kinematics.h"
+#include "motion/read.h"
+#include "storage/library_build.h"
+
+namespace kinespace {
+namespace {
+
+constexpr int clips_per_block = 16;
+constexpr int importer_version = 1;  // raise it when imports of the same file would come out otherwise
+
+// Everything that an import depends on besides its file.
+std::string fingerprint_of(const LibraryBuilderOptions& options) {
+  const SequenceOptions& s = options.space.sequences;
+  return fmt::format("importer {} sequences {} {} {} {} {} {}", importer_version, s.shortest_s, s.longest_s, s.length_weight,
+                     s.jerk_weight, s.break_cm, s.break_ratio);
+}
+
+// One file on its way into the library.
+struct Import {
+  std::filesystem::path file;
+  std::string name;
+  std::string source_hash;  // of the file and, for AMC, its skeleton file
+  std::string tree_hash;
+};
+
+std::string hash_of(const std::filesystem::path& file, const std::optional<std::filesystem::path>& asf) {
+  std::string hash;
+  for (const auto& part : files_read(file, asf)) hash += content_hash(MappedFile(part).bytes());
+  return hash;
+}
+
+// Reads a file unless an earlier build did, and keeps what came of it. True when it was there already.
+bool import_file(Import& import, const LibraryBuilderOptions& options, LibraryBuild& build) {
+  import.source_hash = hash_of(import.file, options.asf);
+  if (const auto known = build.find_import(import.source_hash)) {
+    import.tree_hash = unpack_prepared(*known, import.file.string()).skeleton.tree_hash();
+    return true;
+  }
+  const PreparedClip clip = prepare(read_clip(import.file, options.asf), options.space.sequences);
+  import.tree_hash = clip.skeleton.tree_hash();
+  build.keep_import(import.source_hash, pack_prepared(clip));
+  return false;
+}
+
+int import_files(std::vector<Import>& imports, const LibraryBuilderOptions& options, LibraryBuild& build,
+                 const Progress& progress) {
+  int resumed = 0;
+  const int count = static_cast<int>(imports.size());
+  for (int start = 0; start < count; start += clips_per_block) {
+    progress.check_stop();
+    progress.at("import", static_cast<double>(start) / count);
+    const int in_block = std::min(clips_per_block, count - start);
+    std::vector<char> known(static_cast<std::size_t>(in_block), 0);
+    tbb::parallel_for(0, in_block, [&](int i) {
+      const bool was_there = import_file(imports[static_cast<std::size_t>(start + i)], options, build);
+      known[static_cast<std::size_t>(i)] = was_there ? 1 : 0;
+    });
+    resumed += static_cast<int>(std::ranges::count(known, 1));
+  }
+  progress.at("import", 1);
+  return resumed;
+}
+
+PreparedSource source_of_imports(const std::vector<const Import*>& imports, const LibraryBuild& build) {
+  return {static_cast<int>(imports.size()), [&imports, &build](int i) {
+            const Import& import = *imports[static_cast<std::size_t>(i)];
+            const auto bytes = build.find_import(import.source_hash);
+            if (!bytes) {
+              throw Error(ErrorKind::machine, {.file = import.file.string(), .found = "its import is gone",
+                                               .expected = "the partial library to stay", .remedy = "build again"});
+            }
+            PreparedClip clip = unpack_prepared(*bytes, import.file.string());
+            clip.curves.name = import.name;
+            return clip;
+          }};
+}
+
+MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, const EncodedClip& encoded) {
+  const JointPositions a = joint_positions(clip_from_curves(clip.curves, clip.skeleton));
+  const JointPositions b = joint_positions(clip_from_curves(decode(space, encoded), clip.skeleton));
+  double sum = 0;
+  double worst = 0;
+  for (std::size_t i = 0; i < a.values.size(); ++i) {
+    const double e = (a.values[i] - b.values[i]).norm();
+    sum += e;
+    worst = std::max(worst, e);
+  }
+  return {.mean_joint_error_cm = sum / static_cast<double>(a.values.size()), .max_joint_error_cm = worst};
+}
+
+// What a space does with the clips of one joint tree.
+class SpaceWriter {
+ public:
+  SpaceWriter(Library& library, const BuiltSpace& built, const ClipSpace& clips, const std::string& tree_hash)
+      : library_(library), built_(built), clips_(clips), tree_hash_(tree_hash) {
+    space_id_ = library.put_space({.name = sequence_space_name(tree_hash), .tree_hash = tree_hash, .blob = pack_space(built.space)});
+    library.put_space({.name = clip_space_name(tree_hash), .tree_hash = tree_hash, .blob = clips.pack()});
+  }
+  [[nodiscard]] std::int64_t space_id() const { return space_id_; }
+
+  void write(const std::vector<const Import*>& imports, const PreparedSource& source, LibraryReport& report,
+             const Progress& progress) {
+    for (int start = 0; start < source.count; start += clips_per_block) {
+      progress.check_stop();
+      progress.at("encode", static_cast<double>(start) / source.count);
+      const int count = std::min(clips_per_block, source.count - start);
+      std::vector<Ready> ready(static_cast<std::size_t>(count));
+      tbb::parallel_for(0, count, [&](int i) { ready[static_cast<std::size_t>(i)] = make(source.load(start + i), start + i); });
+      for (int i = 0; i < count; ++i) add(*imports[static_cast<std::size_t>(start + i)], ready[static_cast<std::size_t>(i)], report);
+    }
+    progress.at("encode", 1);
+  }
+
+ private:
+  struct Ready {
+    Skeleton skeleton;
+    EncodedClip clip;
+    std::vector<float> retrieval;
+  };
+
+  [[nodiscard]] Ready make(PreparedClip prepared, int index) const {
+    Ready out;
+    built_.space.apply_references(prepared.curves.values);
+    out.clip = encode(built_.space, prepared.curves, prepared.runs, built_.warps[static_cast<std::size_t>(index)]);
+    out.clip.error = measure_error(prepared, built_.space, out.clip);
+    out.retrieval = clips_.vector_of(prepared.curves);
+    out.skeleton = std::move(prepared.skeleton);
+    return out;
+  }
+
+  void add(const Import& import, const Ready& ready, LibraryReport& report) {
+    const std::int64_t skeleton_id = library_.add_skeleton(
+        {.name = import.file.filename().string(), .tree_hash = tree_hash_, .blob = pack_skeleton(ready.skeleton)});
+    const ClipRow row{.space_id = space_id_, .skeleton_id = skeleton_id, .name = import.name,
+                      .source = import.file.string(), .source_hash = import.source_hash, .rate_hz = ready.clip.rate_hz,
+                      .frames = ready.clip.frames, .labels = labels_of(import.name)};
+    store_clip(library_, row, ready.clip, built_.space, ready.retrieval, false);
+    const double weight = static_cast<double>(row.frames);
+    report.mean_joint_error_cm += weight * ready.clip.error.mean_joint_error_cm;
+    report.max_joint_error_cm = std::max(report.max_joint_error_cm, ready.clip.error.max_joint_error_cm);
+    report.sequences += ready.clip.sequence_count();
+    report.frames += row.frames;
+    ++report.added;
+  }
+
+  Library& library_;
+  const BuiltSpace& built_;
+  const ClipSpace& clips_;
+  std::string tree_hash_;
+  std::int64_t space_id_ = 0;
+};
+
+// Puts the clips that are there already into the extended spaces.
+void transfer_clips(Library& library, std::int64_t space_id, const MotionSpace& from, const MotionSpace& to,
+                    const ClipSpace& clips_from, const ClipSpace& clips_to) {
+  for (const ClipRow& row : library.clips()) {
+    if (row.space_id != space_id) continue;
+    const Skeleton skeleton = unpack_skeleton(library.skeleton(row.skeleton_id).blob, row.name);
+    const PackedClip packed{library.clip_blob(row.id, ClipBlob::vectors), library.clip_blob(row.id, ClipBlob::warps),
+                            library.clip_blob(row.id, ClipBlob::side)};
+    EncodedClip clip = unpack_clip(packed, from, skeleton,
+                                   {.name = row.name, .rate_hz = row.rate_hz, .frames = static_cast<int>(row.frames)}, row.name);
+    for (EncodedRun& run : clip.runs) {
+      for (EncodedSequence& s : run.sequences) s.scores = to.transfer(s.scores, from);
+    }
+    const std::vector<float> old_vector = library.retrieval_vector(row.id);
+    const Eigen::Map<const ScoreMatrix> old_scores(old_vector.data(), clips_from.space().functions(), clips_from.space().curves());
+    const ScoreMatrix scores = clips_to.space().transfer(old_scores, clips_from.space());
+    store_clip(library, row, clip, to, {scores.data(), scores.data() + scores.size()}, true);
+  }
+}
+
+void require_one_tree(const std::map<std::string, std::vector<const Import*>>& by_tree, const LibraryBuilderOptions& options) {
+  if (options.by_skeleton || by_tree.size() < 2) return;
+  const Import& a = *by_tree.begin()->second.front();
+  const Import& b = *std::next(by_tree.begin())->second.front();
+  throw Error(ErrorKind::bad_input, {.file = b.file.string(),
+                                     .found = "another joint tree than that of " + a.file.string(),
+                                     .expected = "clips of one skeleton (bone lengths may differ)",
+                                     .remedy = "build them apart, or give --by-skeleton for one space each"});
+}
+
+// The spaces of one joint tree: new ones, or the library's own extended by the new clips.
+void build_tree(const std::string& tree_hash, const std::vector<const Import*>& imports, const LibraryBuilderOptions& options,
+                LibraryBuild& build, const Compute& compute, const Progress& progress, LibraryReport& report) {
+  Library& library = build.library();
+  const PreparedSource source = source_of_imports(imports, build);
+  std::optional<SpaceRow> old_space, old_clips;
+  for (const SpaceRow& row : library.spaces()) {
+    if (row.name == sequence_space_name(tree_hash)) old_space = library.space(row.id);
+    if (row.name == clip_space_name(tree_hash)) old_clips = library.space(row.id);
+  }
+  if (old_space && old_clips) {
+    const std::string name = build.target().string();
+    const MotionSpace from = unpack_space(old_space->blob, name);
+    const ClipSpace clips_from = ClipSpace::unpack(old_clips->blob, name);
+    const BuiltSpace built = extend_space(from, source, options.space, compute, progress);
+    const ClipSpace clips = clips_from.extend(source, progress);
+    SpaceWriter writer(library, built, clips, tree_hash);
+    transfer_clips(library, writer.space_id(), from, built.space, clips_from, clips);
+    writer.write(imports, source, report, progress);
+  } else {
+    const BuiltSpace built = build_space(source, options.space, compute, progress);
+    const ClipSpace clips = ClipSpace::build(source, built.space.references(), options.clips, progress);
+    SpaceWriter(library, built, clips, tree_hash).write(imports, source, report, progress);
+  }
+}
+
+// Files that are in the library already, with the same name and content, need nothing.
+int drop_unchanged(std::vector<Import>& imports, const Library& library, const LibraryBuilderOptions& options) {
+  const std::size_t before = imports.size();
+  std::erase_if(imports, [&](const Import& import) {
+    const auto row = library.find_clip(import.name);
+    return row && row->source_hash == hash_of(import.file, options.asf);
+  });
+  return static_cast<int>(before - imports.size());
+}
+
+void summarise(Library& library, LibraryReport& report) {
+  std::int64_t sequences = report.sequences;
+  if (const auto before = library.metadata("sequences")) sequences += std::stoll(*before);
+  library.set_metadata("sequences", std::to_string(sequences));
+  report.sequences = static_cast<int>(sequences);
+  report.variance = 1;
+  for (const SpaceRow& row : library.spaces()) {
+    if (!row.name.starts_with("sequences ")) continue;
+    const MotionSpace space = unpack_space(library.space(row.id).blob, row.name);
+    ++report.spaces;
+    report.functions = std::max(report.functions, space.functions());
+    report.variance = std::min(report.variance, space.variance_covered());
+  }
+  library.set_metadata("functions", std::to_string(report.functions));
+  library.set_metadata("variance", fmt::format("{:.9f}", report.variance));
+  report.clips = static_cast<int>(library.totals().clips);
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> find_motion_files(const std::vector<std::filesystem::path>& arguments) {
+  std::set<std::filesystem::path> files;
+  for (const auto& argument : arguments) {
+    if (std::filesystem::is_directory(argument)) {
+      for (const auto& entry : std::filesystem::recursive_directory_iterator(argument)) {
+        if (entry.is_regular_file() && is_motion_file(entry.path())) files.insert(entry.path());
+      }
+    } else if (!std::filesystem::exists(argument)) {
+      throw Error(ErrorKind::bad_input, {.file = argument.string(), .found = "no such file or folder",
+                                         .expected = "a motion file or a folder of them", .remedy = "check the path"});
+    } else if (is_motion_file(argument)) {
+      files.insert(argument);
+    } else {
+      throw Error(ErrorKind::bad_input, {.file = argument.string(), .found = "not a motion file by its ending",
+                                         .expected = ".bvh or .amc", .remedy = "name clips, or folders that hold them"});
+    }
+  }
+  if (files.empty()) {
+    throw Error(ErrorKind::bad_input, {.file = arguments.empty() ? "" : arguments.front().string(),
+                                       .found = "no motion files", .expected = "at least one .bvh or .amc"});
+  }
+  return {files.begin(), files.end()};
+}
+
+std::vector<std::string> clip_names(const std::vector<std::filesystem::path>& files) {
+  std::vector<std::string> names(files.size());
+  std::vector<std::filesystem::path> rest(files.size());
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    names[i] = files[i].stem().string();
+    rest[i] = files[i].parent_path();
+  }
+  for (bool clash = true; clash;) {
+    std::map<std::string, int> uses;
+    for (const std::string& name : names) ++uses[name];
+    clash = false;
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      const std::string folder = rest[i].filename().string();
+      if (uses[names[i]] < 2 || folder.empty()) continue;
+      names[i] = folder + "/" + names[i];
+      rest[i] = rest[i].parent_path();
+      clash = true;
+    }
+  }
+  return names;
+}
+
+std::vector<std::string> labels_of(const std::string& name) {
+  std::vector<std::string> out;
+  const std::string stem = name.substr(name.rfind('/') + 1);
+  for (std::size_t at = 0; at <= stem.size();) {
+    const std::size_t end = std::min(stem.find('_', at), stem.size());
+    const std::string part = stem.substr(at, end - at);
+    const bool number = std::ranges::all_of(part, [](unsigned char c) { return std::isdigit(c) != 0; });
+    if (!number) out.push_back(part);
+    at = end + 1;
+  }
+  return out;
+}
+
+LibraryReport build_library(const std::vector<std::filesystem::path>& files, const std::filesystem::path& target,
+                            const LibraryBuilderOptions& options, const Compute& compute, const Progress& progress) {
+  options.space.validate();
+  options.clips.validate();
+  for (const auto& file : files) require_different_files(file, target);
+  const std::vector<std::string> names = clip_names(files);
+  std::vector<Import> imports(files.size());
+  for (std::size_t i = 0; i < files.size(); ++i) imports[i] = {.file = files[i], .name = names[i]};
+
+  LibraryReport report;
+  LibraryBuild build(target, {.fingerprint = fingerprint_of(options), .extend = options.add});
+  if (options.add) report.unchanged = drop_unchanged(imports, Library::open_read_only(target), options);
+  report.resumed = import_files(imports, options, build, progress);
+
+  std::map<std::string, std::vector<const Import*>> by_tree;
+  for (const Import& import : imports) by_tree[import.tree_hash].push_back(&import);
+  require_one_tree(by_tree, options);
+  for (const auto& [tree_hash, members] : by_tree) build_tree(tree_hash, members, options, build, compute, progress, report);
+  if (report.frames > 0) report.mean_joint_error_cm /= static_cast<double>(report.frames);
+  summarise(build.library(), report);
+  build.finish();
+  report.bytes = static_cast<std::int64_t>(std::filesystem::file_size(target));
+  return report;
+}
+
+}  // namespace kinespace

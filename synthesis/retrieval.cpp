@@ -1,0 +1,115 @@
+#include "synthesis/retrieval.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "fpca/pose_features.h"
+#include "kernels/dtw.h"
+
+namespace kinespace {
+namespace {
+
+struct Candidate {
+  std::int64_t clip_id = 0;
+  double squared = 0;  // distance of the vectors
+  double cost = 0;     // of the DTW
+};
+
+bool has_labels(const ClipRow& row, const std::vector<std::string>& wanted) {
+  return std::ranges::all_of(wanted, [&](const std::string& label) {
+    return std::ranges::find(row.labels, label) != row.labels.end();
+  });
+}
+
+// The `keep` nearest vectors, nearest first, of clips that may be matches.
+std::vector<Candidate> nearest_vectors(const RetrievalMatrix& matrix, const std::vector<float>& query,
+                                       const std::vector<float>& weights, const std::vector<ClipRow>& rows,
+                                       const QueryOptions& options, const std::string& except, std::size_t keep) {
+  std::vector<Candidate> out;
+  std::size_t row = 0;
+  for (std::size_t i = 0; i < matrix.clip_ids.size(); ++i) {
+    while (row < rows.size() && rows[row].id < matrix.clip_ids[i]) ++row;
+    if (row == rows.size() || rows[row].id != matrix.clip_ids[i]) continue;
+    if ((!except.empty() && rows[row].name == except) || !has_labels(rows[row], options.labels)) continue;
+    const auto vector = std::span(matrix.values).subspan(i * matrix.dimensions, matrix.dimensions);
+    out.push_back({.clip_id = matrix.clip_ids[i], .squared = squared_distance(query, vector, weights)});
+  }
+  const auto nearer = [](const Candidate& a, const Candidate& b) {
+    return a.squared != b.squared ? a.squared < b.squared : a.clip_id < b.clip_id;
+  };
+  keep = std::min(keep, out.size());
+  std::ranges::partial_sort(out, out.begin() + static_cast<std::ptrdiff_t>(keep), nearer);
+  out.resize(keep);
+  return out;
+}
+
+void rerank(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton, const QueryOptions& options,
+            const Compute& compute, std::vector<Candidate>& candidates) {
+  const PoseFeatures query = pose_features(curves, skeleton);
+  FeatureSet queries{.dims = query.dims};
+  queries.add(query.values);
+  FeatureSet targets{.dims = query.dims};
+  for (const Candidate& candidate : candidates) {
+    const ClipRow row = library.library().clip(candidate.clip_id);
+    // What the first functions leave out is far below what tells two motions apart.
+    constexpr int functions = 12;
+    targets.add(pose_features(library.curves(row, functions), library.skeleton(row.skeleton_id)).values);
+  }
+  const auto pairs = all_pairs(1, targets.clips());
+  const auto matches = dtw(queries, targets, pairs, {.band_fraction = options.band}, compute);
+  for (std::size_t i = 0; i < candidates.size(); ++i) candidates[i].cost = matches[i].normalised;
+  std::ranges::stable_sort(candidates, {}, &Candidate::cost);
+}
+
+}  // namespace
+
+void QueryOptions::validate() const {
+  const auto fail = [](const std::string& found, const char* expected) {
+    throw Error(ErrorKind::usage, {.found = found, .expected = expected});
+  };
+  if (k < 1) fail(fmt::format("k = {}", k), "1 or more");
+  if (candidates < 1) fail(fmt::format("candidates = {}", candidates), "1 or more");
+  if (!(band > 0 && band <= 1)) fail(fmt::format("band = {}", band), "above 0, up to 1");
+}
+
+std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
+                                   const QueryOptions& options, const std::string& except, const Compute& compute) {
+  options.validate();
+  const auto space_id = library.space_for(skeleton);
+  if (!space_id) return {};
+  const std::vector<float> query = library.clip_space(*space_id).vector_of(curves);
+  const RetrievalMatrix matrix = library.library().retrieval_matrix(*space_id);
+  if (matrix.dimensions != 0 && matrix.dimensions != query.size()) {
+    throw Error(ErrorKind::bad_input, {.file = library.library().path().string(),
+                                       .found = fmt::format("retrieval vectors of {} numbers", matrix.dimensions),
+                                       .expected = fmt::format("{}, as the space of clips has", query.size()),
+                                       .remedy = "build the library again"});
+  }
+  const std::vector<float> weights = options.weighted ? distance_weights(skeleton) : std::vector<float>();
+  const auto wanted = static_cast<std::size_t>(options.k);
+  const std::size_t keep = options.rerank ? std::max(wanted, static_cast<std::size_t>(options.candidates)) : wanted;
+  const std::vector<ClipRow> rows = library.library().clips();
+  std::vector<Candidate> found = nearest_vectors(matrix, query, weights, rows, options, except, keep);
+  if (options.rerank) rerank(library, curves, skeleton, options, compute, found);
+  found.resize(std::min(found.size(), wanted));
+
+  std::vector<Match> out;
+  for (const Candidate& candidate : found) {
+    const auto row = std::ranges::lower_bound(rows, candidate.clip_id, {}, &ClipRow::id);
+    const double distance = std::sqrt(candidate.squared);
+    out.push_back({.clip = row->name, .distance = options.rerank ? candidate.cost : distance, .vector_distance = distance,
+                   .start_s = 0, .end_s = static_cast<double>(row->frames - 1) / row->rate_hz, .labels = row->labels});
+  }
+  return out;
+}
+
+std::vector<Match> nearest_motions(LibraryView& library, const Clip& clip, const QueryOptions& options,
+                                   const std::string& except, const Compute& compute) {
+  return nearest_motions(library, clip_curves(clip), clip.skeleton, options, except, compute);
+}
+
+}  // namespace kinespace

@@ -1,0 +1,46 @@
+// The motions nearest to a clip: yoo2019's distance in the space of whole clips, and the best of these again by time warping.
+//
+// The vectors are searched by the exact L2 distance of all dimensions (eq. 3, or eq. 14 with joint weights); the `candidates`
+// best are then compared by DTW of their keyframes (eq. 12; a slanted band of 10 % of the length, cost divided by the sum of
+// both lengths, since a sum alone favours short clips) and ordered by that. Ties go to the clip that was added first.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "fpca/library_view.h"
+#include "kernels/device.h"
+
+namespace kinespace {
+
+struct QueryOptions {
+  int k = 10;                       // matches wanted, >= 1
+  bool rerank = true;               // order the best again by DTW
+  int candidates = 50;              // of which so many, >= k counts as k
+  bool weighted = false;            // joint weights (eq. 14) in the vector distance
+  double band = 0.1;                // of the DTW, (0, 1]
+  std::vector<std::string> labels;  // only clips that have all of these
+
+  // Throws Error{usage} naming field, value and legal range.
+  void validate() const;
+};
+
+struct Match {
+  std::string clip;
+  double distance = 0;         // with rerank the normalised DTW cost, else the L2 distance of the vectors
+  double vector_distance = 0;  // always the latter
+  double start_s = 0;          // what of the clip matches: all of it
+  double end_s = 0;
+  std::vector<std::string> labels;
+};
+
+// The clips of the library nearest to `clip`, nearest first; `except` (a clip's name) is left out. No clips of that joint
+// tree: no matches. The clip may be of any frame rate and of other bone lengths.
+[[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const Clip& clip, const QueryOptions& options = {},
+                                                 const std::string& except = {}, const Compute& compute = {});
+// The same for curves of a skeleton, as LibraryView::curves gives them.
+[[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
+                                                 const QueryOptions& options = {}, const std::string& except = {},
+                                                 const Compute& compute = {});
+
+}  // namespace kinespace
