@@ -3,9 +3,11 @@
 #include <memory>
 #include <string>
 
+#include "base/error.h"
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "fpca/library_view.h"
 #include "motion/read.h"
 
 namespace kinespace::cli {
@@ -47,7 +49,65 @@ Json describe_clip(const std::filesystem::path& file) {
           {"bytes", std::filesystem::file_size(file)}};
 }
 
+bool is_library(const std::filesystem::path& file) {
+  return std::filesystem::is_regular_file(file) && Library::looks_like_library(MappedFile(file).bytes());
+}
+
+// A fact that the builder left, as a number; null where there is none.
+Json metadata_number(const Library& library, const char* key) {
+  const auto text = library.metadata(key);
+  return text ? Json::parse(*text, nullptr, false) : Json();
+}
+
+Json describe_space(LibraryView& view, const SpaceRow& row) {
+  const MotionSpace& space = view.space(row.id);
+  return {{"joints", space.skeleton().joint_count()},
+          {"rotating_joints", space.layout().joint_count()},
+          {"curves", space.curves()},
+          {"points", space.points()},
+          {"functions", space.function_count()},
+          {"variance", space.variance_covered()}};
+}
+
+Json describe_library(const std::filesystem::path& file) {
+  LibraryView view(file);
+  const Library& library = view.library();
+  const LibraryTotals totals = library.totals();
+  Json clips = Json::array();
+  Json spaces = Json::array();
+  double rate = 0;
+  std::int64_t joints = 0;
+  double height = 0;
+  for (const ClipRow& row : library.clips()) {
+    rate = std::max(rate, row.rate_hz);
+    clips.push_back({{"name", row.name}, {"frames", row.frames}, {"rate_hz", row.rate_hz}, {"labels", row.labels}});
+  }
+  for (const SpaceRow& row : library.spaces()) {
+    if (!row.name.starts_with("sequences ")) continue;
+    spaces.push_back(describe_space(view, row));
+    joints = std::max<std::int64_t>(joints, view.space(row.id).skeleton().joint_count());
+    height = std::max(height, view.space(row.id).skeleton().rest_height());
+  }
+  return {{"kind", "library"},
+          {"clips", totals.clips},
+          {"sequences", metadata_number(library, "sequences")},
+          {"functions", metadata_number(library, "functions")},
+          {"variance", metadata_number(library, "variance")},
+          {"frames", totals.frames},
+          {"seconds", totals.seconds},
+          {"rate_hz", rate},
+          {"joints", joints},
+          {"height_cm", height},
+          {"bytes", totals.file_bytes},
+          {"vector_bytes", totals.vector_bytes},
+          {"space_bytes", totals.space_bytes},
+          {"retrieval_bytes", totals.retrieval_bytes},
+          {"spaces", std::move(spaces)},
+          {"clip_list", std::move(clips)}};
+}
+
 constexpr std::array describers{
+    Describer{is_library, describe_library},
     Describer{[](const std::filesystem::path&) { return true; }, describe_clip},
 };
 
@@ -69,7 +129,7 @@ void add_info(CLI::App& app, Session& /*session*/) {
   };
   CLI::App* command = app.add_subcommand("info", "What is in a file");
   const auto options = std::make_shared<Options>();
-  command->add_option("FILE", options->file, "A clip (.bvh, .amc)")->required();
+  command->add_option("FILE", options->file, "A clip (.bvh, .amc) or a library (.kspace)")->required();
   command->add_flag("--json", options->json, "Print it as one JSON object");
   command->callback([options] { run_info(options->file, options->json); });
 }

@@ -1,0 +1,93 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "cli/commands.h"
+#include "cli/json_output.h"
+#include "fpca/library_builder.h"
+
+namespace kinespace::cli {
+namespace {
+
+struct BuildOptions {
+  std::vector<std::filesystem::path> inputs;
+  std::filesystem::path output;
+  LibraryBuilderOptions library;
+  std::string asf;
+  std::string grouping = "all";
+  int functions = 0;
+  std::string device = "auto";
+  bool no_align = false;
+  bool json = false;
+};
+
+Json to_json(const LibraryReport& report, const std::filesystem::path& output, double seconds) {
+  return {{"library", output.string()},
+          {"clips", report.clips},
+          {"added", report.added},
+          {"unchanged", report.unchanged},
+          {"resumed", report.resumed},
+          {"sequences", report.sequences},
+          {"spaces", report.spaces},
+          {"functions", report.functions},
+          {"variance", report.variance},
+          {"mean_joint_error_cm", report.mean_joint_error_cm},
+          {"max_joint_error_cm", report.max_joint_error_cm},
+          {"frames", report.frames},
+          {"bytes", report.bytes},
+          {"seconds", seconds}};
+}
+
+Grouping grouping_of(const std::string& name) {
+  if (name == "component") return Grouping::per_component;
+  if (name == "joint") return Grouping::per_joint_component;
+  return Grouping::all_together;
+}
+
+void run_build(BuildOptions options, Session& session) {
+  const auto start = std::chrono::steady_clock::now();
+  LibraryBuilderOptions& library = options.library;
+  library.space.align = !options.no_align;
+  library.space.space.grouping = grouping_of(options.grouping);
+  if (options.functions > 0) library.space.space.functions = options.functions;
+  if (!options.asf.empty()) library.asf = options.asf;
+  const Compute compute = Compute::open(options.device);
+  const auto files = find_motion_files(options.inputs);
+  session.detail(fmt::format("{} motion files", files.size()));
+  const LibraryReport report = build_library(files, options.output, library, compute, session.progress());
+  session.finish_progress();
+  const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+  const Json result = to_json(report, options.output, elapsed.count());
+  options.json ? print_json(result) : print_fields(result);
+}
+
+}  // namespace
+
+void add_build(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand("build", "Make a motion-space library of clips");
+  const auto options = std::make_shared<BuildOptions>();
+  LibraryBuilderOptions& library = options->library;
+  command->add_option("CLIPS", options->inputs, "Clips (.bvh, .amc), or folders with clips anywhere below them")->required();
+  command->add_option("-o,--output", options->output, "The library to make, LIB.kspace")->required();
+  command->add_flag("--add", library.add, "Add to the library that is there instead of replacing it");
+  command->add_flag("--by-skeleton", library.by_skeleton, "One space for each joint tree, where clips have several");
+  command->add_option("--asf", options->asf, "The skeleton of the .amc clips (else found beside each)");
+  command->add_option("--variance", library.space.space.variance_share, "Share of variance the functions must cover")
+      ->capture_default_str();
+  command->add_option("--functions", options->functions, "This many functions instead")->check(CLI::PositiveNumber);
+  command->add_option("--points", library.space.space.points, "Points of a sequence's time grid (0: from the frame rate)")
+      ->capture_default_str();
+  command->add_option("--grouping", options->grouping, "Which curves share functions: all, component or joint")
+      ->check(CLI::IsMember({"all", "component", "joint"}))
+      ->capture_default_str();
+  command->add_flag("--smooth", library.space.space.smooth, "Smooth mean and covariance and take noise off (PACE)");
+  command->add_flag("--no-align", options->no_align, "Leave the timing of sequences as it is");
+  command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
+  command->add_flag("--json", options->json, "Print the result as one JSON object");
+  command->callback([options, &session] { run_build(*options, session); });
+}
+
+}  // namespace kinespace::cli

@@ -1,0 +1,61 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include "base/file.h"
+#include "cli/commands.h"
+#include "cli/json_output.h"
+#include "fpca/library_view.h"
+#include "motion/read.h"
+
+namespace kinespace::cli {
+namespace {
+
+struct ExportOptions {
+  std::filesystem::path library;
+  std::string clip;
+  std::filesystem::path output;
+  std::optional<int> functions;
+  std::optional<double> max_error_cm;
+  bool json = false;
+};
+
+void run_export(const ExportOptions& options) {
+  for (const auto& file : files_written(options.output)) require_different_files(options.library, file);
+  LibraryView library(options.library);
+  const ClipRow row = library.require_clip(options.clip);
+  const MotionSpace& space = library.space(row.space_id);
+  int functions = space.functions();
+  if (options.functions) functions = std::min(*options.functions, functions);
+  if (options.max_error_cm) functions = library.functions_for_error(row, *options.max_error_cm);
+  const EncodedClip encoded = library.encoded(row);
+  const Skeleton& skeleton = library.skeleton(row.skeleton_id);
+  write_clip(options.output, clip_from_curves(decode(space, encoded, functions), skeleton));
+  const Json result{{"clip", row.name},
+                    {"output", options.output.string()},
+                    {"frames", row.frames},
+                    {"functions", functions},
+                    {"of_functions", space.functions()},
+                    {"rms_error_bound_cm", truncation_bound_cm(space, skeleton, encoded, functions)}};
+  options.json ? print_json(result) : print_fields(result);
+}
+
+}  // namespace
+
+void add_export(CLI::App& app, Session& /*session*/) {
+  CLI::App* command = app.add_subcommand("export", "Play a clip of a library into a file, at any level of detail");
+  const auto options = std::make_shared<ExportOptions>();
+  command->add_option("LIB", options->library, "The library")->required();
+  command->add_option("CLIP", options->clip, "The clip's name")->required();
+  command->add_option("-o,--output", options->output, "The file to write: .bvh, .amc, .glb or .gltf")->required();
+  CLI::Option* lod = command->add_option("--lod", options->functions, "Use only the first N functions")->check(CLI::NonNegativeNumber);
+  command->add_option("--max-error", options->max_error_cm, "The fewest functions with every joint this near, in cm")
+      ->check(CLI::NonNegativeNumber)
+      ->excludes(lod);
+  command->add_flag("--json", options->json, "Print what was written as one JSON object");
+  command->callback([options] { run_export(*options); });
+}
+
+}  // namespace kinespace::cli

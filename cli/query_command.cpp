@@ -1,0 +1,84 @@
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "base/error.h"
+#include "cli/commands.h"
+#include "cli/json_output.h"
+#include "motion/read.h"
+#include "synthesis/retrieval.h"
+
+namespace kinespace::cli {
+namespace {
+
+struct QueryCommandOptions {
+  std::filesystem::path library;
+  std::string clip;
+  QueryOptions query;
+  bool no_rerank = false;
+  std::string device = "auto";
+  bool json = false;
+};
+
+Json to_json(const std::string& query, const std::vector<Match>& matches) {
+  Json list = Json::array();
+  for (const Match& match : matches) {
+    list.push_back({{"clip", match.clip}, {"distance", match.distance}, {"vector_distance", match.vector_distance},
+                    {"start_s", match.start_s}, {"end_s", match.end_s}, {"labels", match.labels}});
+  }
+  return {{"query", query}, {"matches", std::move(list)}};
+}
+
+void print_matches(const std::vector<Match>& matches) {
+  if (matches.empty()) {
+    fmt::print("no match\n");
+    return;
+  }
+  fmt::print("{:>10}  {:>8}  clip\n", "distance", "seconds");
+  for (const Match& match : matches) fmt::print("{:>10.5f}  {:>8.2f}  {}\n", match.distance, match.end_s - match.start_s, match.clip);
+}
+
+// A file where there is one of that name and a clip reader for it, else a clip of the library.
+bool is_file(const std::string& text) { return is_motion_file(text) && std::filesystem::exists(text); }
+
+std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute) {
+  if (is_file(options.clip)) {
+    const Clip clip = read_clip(options.clip);
+    if (!library.space_for(clip.skeleton)) {
+      throw Error(ErrorKind::bad_input, {.file = options.clip, .found = "a skeleton that the library has no clips of",
+                                         .expected = "the joint names, parents and channels of its clips",
+                                         .remedy = "kinespace build --add --by-skeleton adds clips of another skeleton"});
+    }
+    return nearest_motions(library, clip, options.query, {}, compute);
+  }
+  const ClipRow row = library.require_clip(options.clip);
+  return nearest_motions(library, library.curves(row), library.skeleton(row.skeleton_id), options.query, row.name, compute);
+}
+
+void run_query(QueryCommandOptions options) {
+  options.query.rerank = !options.no_rerank;
+  options.query.validate();
+  LibraryView library(options.library);
+  const std::vector<Match> matches = find(library, options, Compute::open(options.device));
+  options.json ? print_json(to_json(options.clip, matches)) : print_matches(matches);
+}
+
+}  // namespace
+
+void add_query(CLI::App& app, Session& /*session*/) {
+  CLI::App* command = app.add_subcommand("query", "The motions of a library that are nearest to a clip");
+  const auto options = std::make_shared<QueryCommandOptions>();
+  command->add_option("LIB", options->library, "The library")->required();
+  command->add_option("CLIP", options->clip, "A clip of the library by its name, or a file (.bvh, .amc)")->required();
+  command->add_option("-k", options->query.k, "How many")->capture_default_str();
+  command->add_flag("--no-rerank,!--rerank", options->no_rerank, "Order by the motion vectors alone, without DTW");
+  command->add_option("--candidates", options->query.candidates, "How many the DTW orders again")->capture_default_str();
+  command->add_flag("--weighted", options->query.weighted, "Joint weights in the vector distance");
+  command->add_option("--label", options->query.labels, "Only clips with this label; may be given again");
+  command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
+  command->add_flag("--json", options->json, "Print the matches as one JSON object");
+  command->callback([options] { run_query(*options); });
+}
+
+}  // namespace kinespace::cli
