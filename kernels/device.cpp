@@ -121,7 +121,7 @@ const std::string& Compute::choice() const {
 }
 
 std::string Compute::describe() const {
-  const std::string processor =
+  std::string processor =
       "cpu (" + std::to_string(std::max(1U, std::thread::hardware_concurrency())) + " threads, float and double)";
   if (state_->choice == "cpu") return processor;
   if (!state_->opened) return processor + "; OpenCL not needed so far";

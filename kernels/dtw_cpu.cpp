@@ -22,7 +22,7 @@ KINESPACE_SIMD_BODY void squared_distances_body(const float* const* rows, const 
   for (int block = 0; block < blocks; ++block) {
     float sums[kRows][kFrames] = {};
     for (int k = 0; k < dims; ++k) {
-      const float* frames = clip + static_cast<std::ptrdiff_t>(k) * stride + block * kFrames;
+      const float* frames = clip + static_cast<std::ptrdiff_t>(k) * stride + std::ptrdiff_t{kFrames} * block;
       for (int r = 0; r < kRows; ++r) {
         for (int c = 0; c < kFrames; ++c) {
           const float difference = frames[c] - rows[r][k];

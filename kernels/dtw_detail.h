@@ -43,7 +43,7 @@ struct Region {
 template <typename StepAt>
 std::vector<FramePair> trace_back(int n, int m, bool slope_limited, const StepAt& step_at) {
   std::vector<FramePair> path;
-  path.reserve(static_cast<std::size_t>(n + m));
+  path.reserve(static_cast<std::size_t>(n) + static_cast<std::size_t>(m));
   int i = n - 1;
   int j = m - 1;
   bool straight = false;  // the step after this cell was straight, so that the cell was reached diagonally

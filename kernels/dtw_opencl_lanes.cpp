@@ -59,7 +59,7 @@ std::vector<TileRange> tile_ranges(const DeviceTask& task, std::span<const Devic
     for (int tile = 0; tile < tiles_of(m); ++tile) {
       auto& range = ranges[tile];
       const int last = std::min(tile * kFrames + kFrames, m) - 1;
-      range.first = std::min(range.first, static_cast<int>(region.first_row(tile * kFrames)));
+      range.first = std::min(range.first, static_cast<int>(region.first_row(std::int64_t{kFrames} * tile)));
       range.end = std::max(range.end, static_cast<int>(region.end_row(last)));
     }
   }

@@ -19,6 +19,10 @@ double distance(const float* a, const float* b, int dims, bool squared) {
   return squared ? sum : std::sqrt(sum);
 }
 
+const float* row_of(std::span<const float> clip, int row, int dims) {
+  return clip.data() + static_cast<std::ptrdiff_t>(row) * dims;
+}
+
 // D of a row and, for slope limits, the part of it that was reached diagonally (else the same).
 struct Row {
   explicit Row(int m) : cost(m + 1, kInfinity), straight(m + 1, kInfinity) {}
@@ -41,7 +45,8 @@ DtwMatch match_pair(std::span<const float> a, std::span<const float> b, int dims
       const double diagonal = above.cost[j];
       const double left = here.straight[j];
       const double up = above.straight[j + 1];
-      const double d = region.in_band(i, j) ? distance(&a[i * dims], &b[j * dims], dims, options.squared) : kInfinity;
+      const double d =
+          region.in_band(i, j) ? distance(row_of(a, i, dims), row_of(b, j, dims), dims, options.squared) : kInfinity;
       here.cost[j + 1] = d + std::min(diagonal, std::min(left, up));
       here.straight[j + 1] = region.slope_limited ? d + diagonal : here.cost[j + 1];
       if (options.want_path && diagonal > std::min(left, up)) {
