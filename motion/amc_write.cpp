@@ -134,7 +134,8 @@ void append_bone(std::string& out, const Bone& bone, std::size_t id) {
 // One line a parent. Parents come before their children in the list of bones, and so here.
 void append_hierarchy(std::string& out, const std::vector<Bone>& bones) {
   std::vector<std::string> below(bones.size() + 1);  // 0 is the root
-  for (const Bone& bone : bones) below[static_cast<std::size_t>(bone.parent + 1)] += " " + bone.name;
+  for (const Bone& bone : bones)
+    below[bone.parent < 0 ? 0 : static_cast<std::size_t>(bone.parent) + 1] += " " + bone.name;
   out += ":hierarchy\n  begin\n";
   for (std::size_t b = 0; b < below.size(); ++b) {
     if (!below[b].empty()) out += "    " + (b == 0 ? "root" : bones[b - 1].name) + below[b] + "\n";

@@ -110,10 +110,14 @@ std::vector<int> depth_first(const Skeleton& skeleton) {
 class MotionWriter {
  public:
   MotionWriter(const Clip& clip, const JointChannels& channels, const std::vector<int>& walk, std::string& out)
-      : clip_(clip), channels_(channels), walk_(walk), out_(out), block_(count(channels)), near_(channels.size()) {
-    width_ = count(channels);
-    columns_.resize(3 * static_cast<std::size_t>(block_.rows()));
-  }
+      : clip_(clip),
+        channels_(channels),
+        walk_(walk),
+        out_(out),
+        width_(count(channels)),
+        block_(width_),
+        near_(channels.size()),
+        columns_(3 * static_cast<std::size_t>(block_.rows())) {}
 
   void write() {
     out_.reserve(out_.size() + static_cast<std::size_t>(clip_.frames) * (width_ * 11 + 1));
@@ -151,7 +155,8 @@ class MotionWriter {
         double* out = block_.data(column++);
         if (is_position(c)) {
           for (int f = 0; f < some; ++f) {
-            out[f] = (track != nullptr ? track->values[static_cast<std::size_t>(first + f)] : offset)[axis_of(c)];
+            out[f] = (track != nullptr ? track->values[static_cast<std::size_t>(first) + static_cast<std::size_t>(f)]
+                                       : offset)[axis_of(c)];
           }
         } else {
           std::copy_n(angles, some, out);
@@ -165,9 +170,9 @@ class MotionWriter {
   const JointChannels& channels_;
   const std::vector<int>& walk_;
   std::string& out_;
+  std::size_t width_;
   ColumnBlock block_;
   std::vector<EulerAngles> near_;
-  std::size_t width_ = 0;
   std::vector<double> columns_;
 };
 

@@ -54,7 +54,7 @@ struct HalfAngles {
 template <int I, int J, int K>
 void multiply(const HalfAngles& a, const HalfAngles& b, const HalfAngles& c, int count, double* out) {
   constexpr double e = (J - I + 3) % 3 == 1 ? 1 : -1;
-  for (int f = 0; f < count; ++f) {
+  for (std::ptrdiff_t f = 0; f < count; ++f) {
     const double sa = a.sine[f], ca = a.cosine[f], sb = e * b.sine[f], cb = b.cosine[f], sc = c.sine[f],
                  cc = c.cosine[f];
     const double cacc = ca * cc, sasc = sa * sc, sacc = sa * cc, casc = ca * sc;
@@ -204,7 +204,7 @@ EulerOrder euler_order(std::span<const Channel> channels) {
 
 void quaternions_from_euler(const EulerOrder& order, const double* a, const double* b, const double* c, int count,
                             double* wxyz) {
-  HalfAngles ha, hb, hc;
+  HalfAngles ha{}, hb{}, hc{};
   for (int first = 0; first < count; first += block) {
     const int some = std::min(block, count - first);
     half_angle_sincos(a + first, some, ha.sine.data(), ha.cosine.data());

@@ -25,7 +25,7 @@ struct LocalBlock {
 
 void load(const Clip& clip, int joint, const Clip::TranslationTrack* track, int first, int count, LocalBlock& out) {
   const double* q = clip.rotation_track(joint).data() + static_cast<std::size_t>(first) * 4;
-  for (int f = 0; f < count; ++f) {
+  for (std::ptrdiff_t f = 0; f < count; ++f) {
     out.w[f] = q[4 * f];
     out.x[f] = q[4 * f + 1];
     out.y[f] = q[4 * f + 2];

@@ -51,7 +51,7 @@ void append_fixed(std::string& out, double value) {
   constexpr double largest = 9e12;  // scaled values stay below 2^63
   if (!(std::abs(value) < largest)) return append_exact(out, value);
   auto units = static_cast<std::int64_t>(std::nearbyint(value * scale));
-  std::array<char, 24> text;
+  std::array<char, 24> text{};
   char* at = text.data() + text.size();
   const bool negative = units < 0;
   if (negative) units = -units;
@@ -72,7 +72,7 @@ void append_fixed(std::string& out, double value) {
 }
 
 void append_exact(std::string& out, double value) {
-  std::array<char, 32> text;
+  std::array<char, 32> text{};
   const auto [end, code] = std::to_chars(text.data(), text.data() + text.size(), value + 0.0);  // no "-0"
   out.append(text.data(), static_cast<std::size_t>(end - text.data()));
 }
