@@ -52,7 +52,7 @@ SampleMatrix decode_frames(const MotionSpace& space, const EncodedSequence& sequ
 }
 
 // The correction's shape over the distance x (in fractions of the sequence) from the cut: `value` is 1 at the cut with no
-// slope, `slope` is 0 there with slope 1; both vanish smoothly at x = blend.
+// slope, `slope` is 0 there and rises at once; both vanish smoothly at x = blend.
 struct Fade {
   double value = 0;
   double slope = 0;
@@ -62,7 +62,7 @@ Fade fade(double x, double blend) {
   const double u = 1 - x / blend;
   if (u <= 0) return {};
   const double u3 = u * u * u;
-  return {u3 * (10 - 15 * u + 6 * u * u), blend * (1 - u) * u3 * (1 + 3 * (1 - u))};
+  return {u3 * (10 - 15 * u + 6 * u * u), (1 - u) * u3 * (1 + 3 * (1 - u))};
 }
 
 // Typical change of slope from frame to frame inside a sequence, by curve.
@@ -106,14 +106,17 @@ void join(std::vector<DecodedSequence>& sequences, const JoinOptions& options) {
   for (std::size_t i = 0; i < sequences.size(); ++i) {
     SampleMatrix& frames = sequences[i].frames;
     const auto n = static_cast<double>(frames.rows() - 1);
+    // A slope of 1 per frame at the cut means 1 at the first frame beside it.
+    const double first = n > 0 ? fade(1 / n, options.blend).slope : 0;
+    const double steepness = first > 0 ? 1 / first : 0;
     for (Eigen::Index f = 0; f < frames.rows(); ++f) {
       if (i > 0) {
         const Fade w = fade(static_cast<double>(f) / n, options.blend);
-        frames.row(f) += -w.value * cuts[i - 1].value - (w.slope * n) * cuts[i - 1].slope;
+        frames.row(f) += -w.value * cuts[i - 1].value - (w.slope * steepness) * cuts[i - 1].slope;
       }
       if (i + 1 < sequences.size()) {
         const Fade w = fade((n - static_cast<double>(f)) / n, options.blend);
-        frames.row(f) += w.value * cuts[i].value - (w.slope * n) * cuts[i].slope;
+        frames.row(f) += w.value * cuts[i].value - (w.slope * steepness) * cuts[i].slope;
       }
     }
   }

@@ -44,8 +44,8 @@ struct EncodedClip {
 };
 
 struct JoinOptions {
-  double blend = 0.15;        // of a sequence's length, (0, 0.5]
-  double free_change = 0.35;  // how much of the typical change of slope inside (rms) may stay at a cut; >= 0
+  double blend = 0.13;       // of a sequence's length, (0, 0.5]
+  double free_change = 0.3;  // how much of the typical change of slope inside (rms) may stay at a cut; >= 0
 };
 
 // The curves of a run as splines, ready to be sampled sequence by sequence.

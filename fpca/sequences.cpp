@@ -108,10 +108,11 @@ struct Lengths {
   int longest;
 };
 
-// Whole frames for the legal lengths; widened where no number of legal sequences adds up to n steps.
+// The legal lengths as steps between the first and the last of that many frames; widened where no number of legal sequences adds up to n steps.
 Lengths legal_lengths(int n, double rate_hz, const SequenceOptions& options) {
-  const int longest = std::max(1, static_cast<int>(std::floor(options.longest_s * rate_hz)));
-  const int shortest = std::clamp(static_cast<int>(std::ceil(options.shortest_s * rate_hz)), 1, longest);
+  constexpr double rounding = 1e-9;  // 0.8 s at 30 Hz are 24 frames, not 25
+  const int longest = std::max(1, static_cast<int>(std::floor(options.longest_s * rate_hz + rounding)) - 1);
+  const int shortest = std::clamp(static_cast<int>(std::ceil(options.shortest_s * rate_hz - rounding)) - 1, 1, longest);
   const int fewest = (n + longest - 1) / longest;
   return {std::min(shortest, n / fewest), longest};
 }
@@ -128,7 +129,7 @@ Run cut_run(const Movement& movement, int first, int last, double rate_hz, const
   best[0] = 0;
   for (int i = shortest; i <= n; ++i) {
     for (int k = std::max(0, i - longest); k <= i - shortest; ++k) {
-      const double x = ((i - k) / rate_hz - options.shortest_s) / (options.longest_s - options.shortest_s);
+      const double x = ((i - k + 1) / rate_hz - options.shortest_s) / (options.longest_s - options.shortest_s);
       const double length = options.length_weight * (0.4 * x + 0.6 * x * std::abs(x));
       const double total = best[static_cast<std::size_t>(k)] + length;
       if (total < best[static_cast<std::size_t>(i)]) {

@@ -18,7 +18,7 @@
 namespace kinespace {
 
 struct SequenceOptions {
-  double shortest_s = 0.8;     // > 0
+  double shortest_s = 0.8;     // > 0; a sequence of n frames lasts n / rate
   double longest_s = 1.2;      // > shortest_s
   double length_weight = 5;    // >= 0; how much a sequence of the longest length costs against a cut amid motion
   double jerk_weight = 3;      // >= 0
