@@ -230,10 +230,11 @@ CurveCovariance covariance(const RowMatrixView<float>& curves, int lost) {
   for (Eigen::Index c = 0; c < curves.rows(); ++c) {
     for (Eigen::Index i = 0; i < points; ++i) {
       for (Eigen::Index j = 0; j < points; ++j) {
-        out.covariance(i, j) += (curves(c, i) - out.mean[i]) * (curves(c, j) - out.mean[j]) / (n - lost);
+        out.covariance(i, j) += (curves(c, i) - out.mean[i]) * (curves(c, j) - out.mean[j]);
       }
     }
   }
+  out.covariance /= n - lost;
   return out;
 }
 

@@ -6,6 +6,7 @@
 #include "kernels/dtw.h"
 #include "kernels/kernel_descriptor.h"
 #include "kernels/keyframe_distance.h"
+#include "kernels/local_linear.h"
 #include "kernels/projection.h"
 
 namespace kinespace {
@@ -210,6 +211,78 @@ KernelDescriptor projection_descriptor(std::string name, decltype(&compare_proje
           .compare = compare};
 }
 
+// A smooth symmetric surface with noise.
+Eigen::MatrixXd noisy_surface(int points, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd out(points, points);
+  for (int i = 0; i < points; ++i) {
+    for (int j = 0; j <= i; ++j) out(i, j) = out(j, i) = std::cos(3.0 * (i - j) / points) + 0.1 * normal(random);
+  }
+  return out;
+}
+
+Comparison compare_surfaces(const Sizes& sizes, const Compute& compute, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  const Eigen::MatrixXd surface = noisy_surface(sizes[0], random);
+  const auto diagonal = seed % 2 == 0 ? Diagonal::kept : Diagonal::left_out;
+  const double bandwidth = std::max(0.2, 2.5 / (sizes[0] - 1));
+  LocalLinearSurface smoother(sizes[0], sizes[1], SmoothingKernel::epanechnikov, bandwidth, diagonal);
+  Comparison out;
+  Eigen::MatrixXd found;
+  Eigen::MatrixXd expected;
+  timed(out.kernel_seconds, [&] { return smoother.smooth(surface, found, compute), 0; });
+  timed(out.reference_seconds, [&] { return smoother.smooth(surface, expected), 0; });
+  out.error = relative_error(found, expected);
+  return out;
+}
+
+Comparison compare_lines(const Sizes& sizes, const Compute& compute, SmoothingKernel kernel, std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(0.1, 1);
+  std::vector<double> values(sizes[0]);
+  std::vector<double> weights(seed % 2 == 0 ? 0 : values.size());
+  std::vector<double> at(sizes[1]);
+  for (auto* numbers : {&values, &weights, &at}) {
+    for (double& number : *numbers) number = uniform(random);
+  }
+  const double bandwidth = std::max(0.15, 2.5 / (sizes[0] - 1));
+  Comparison out;
+  const auto found =
+      timed(out.kernel_seconds, [&] { return local_linear_line(values, weights, kernel, bandwidth, at, compute); });
+  const auto expected =
+      timed(out.reference_seconds, [&] { return local_linear_line(values, weights, kernel, bandwidth, at); });
+  out.error = relative_error(Eigen::VectorXd::Map(found.data(), static_cast<Eigen::Index>(found.size())),
+                             Eigen::VectorXd::Map(expected.data(), static_cast<Eigen::Index>(expected.size())));
+  return out;
+}
+
+KernelDescriptor surface_descriptor() {
+  return {.name = "local_linear_surface",
+          .family = KernelFamily::local_linear,
+          .size_names = {"points", "out_points"},
+          .test_sizes = {{4, 1}, {5, 4}, {15, 16}, {16, 15}, {17, 17}, {33, 100}, {101, 51}},
+          .bench_sizes = {200, 200},
+          .tolerance = 1e-11,
+          .single_tolerance = 1e-4,
+          .flops = [](const Sizes& s) { return 4.0 * product(s) * (s[0] + s[1]); },
+          .bytes = [](const Sizes& s) { return 8.0 * (1.0 * s[0] * s[0] + 1.0 * s[1] * s[1]); },
+          .compare = compare_surfaces};
+}
+
+KernelDescriptor line_descriptor(std::string name, SmoothingKernel kernel) {
+  return {.name = std::move(name),
+          .family = KernelFamily::local_linear,
+          .size_names = {"points", "places"},
+          .test_sizes = {{4, 0}, {4, 1}, {5, 15}, {16, 16}, {17, 17}, {100, 33}, {101, 100}},
+          .bench_sizes = {1000, 1000},
+          .tolerance = 1e-11,
+          .single_tolerance = 1e-4,
+          .flops = [](const Sizes& s) { return 12 * product(s); },
+          .bytes = [](const Sizes& s) { return 8.0 * (2 * s[0] + 2 * s[1]); },
+          .compare = [kernel](const Sizes& sizes, const Compute& compute,
+                              std::uint32_t seed) { return compare_lines(sizes, compute, kernel, seed); }};
+}
+
 }  // namespace
 
 std::vector<KernelDescriptor> kernel_descriptors() {
@@ -222,7 +295,11 @@ std::vector<KernelDescriptor> kernel_descriptors() {
           dtw_descriptor("dtw, slopes, band, path", {.steps = slopes, .band_fraction = 0.2, .want_path = true}),
           covariance_descriptor(),
           projection_descriptor("project", compare_projection),
-          projection_descriptor("reconstruct", compare_reconstruction)};
+          projection_descriptor("reconstruct", compare_reconstruction),
+          surface_descriptor(),
+          line_descriptor("local_linear_line, epanechnikov", SmoothingKernel::epanechnikov),
+          line_descriptor("local_linear_line, quartic", SmoothingKernel::quartic),
+          line_descriptor("local_linear_line, gauss", SmoothingKernel::gauss)};
 }
 
 }  // namespace kinespace

@@ -102,7 +102,7 @@ std::vector<DeviceInfo> list_devices() {
 
 Compute::Compute() : state_(std::make_shared<State>()) {}
 
-Compute::Compute(std::shared_ptr<State> state, KernelVariant variant) : state_(std::move(state)), variant_(variant) {}
+Compute::Compute(std::shared_ptr<State> state) : state_(std::move(state)) {}
 
 Compute Compute::open(const std::string& choice) {
   const bool named = choice == "opencl" || device_number(choice).has_value();
@@ -113,7 +113,7 @@ Compute Compute::open(const std::string& choice) {
   auto state = std::make_shared<State>();
   state->choice = choice;
   if (named) state->open_named();
-  return Compute(std::move(state), KernelVariant::by_device);
+  return Compute(std::move(state));
 }
 
 const std::string& Compute::choice() const {
@@ -133,7 +133,15 @@ std::string Compute::describe() const {
 }
 
 Compute Compute::with_variant(KernelVariant variant) const {
-  return Compute(state_, variant);
+  Compute other(*this);
+  other.variant_ = variant;
+  return other;
+}
+
+Compute Compute::without_double() const {
+  Compute other(*this);
+  other.may_use_double_ = false;
+  return other;
 }
 
 OpenClDevice* Compute::device_for(KernelFamily family, double flops) const {
@@ -151,6 +159,10 @@ OpenClDevice* Compute::device_for(KernelFamily family, double flops) const {
 
 bool Compute::uses_lanes(const OpenClDevice& device) const {
   return variant_ == KernelVariant::by_device ? device.is_processor() : variant_ == KernelVariant::lanes;
+}
+
+bool Compute::uses_double(const OpenClDevice& device) const {
+  return may_use_double_ && device.info().fp64;
 }
 
 void use_single_threaded_blas() {

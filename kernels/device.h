@@ -62,6 +62,9 @@ class Compute {
   // The same device with another kernel shape; for tests and benches.
   [[nodiscard]] Compute with_variant(KernelVariant variant) const;
 
+  // The same device as if it had no double precision; for tests.
+  [[nodiscard]] Compute without_double() const;
+
   // The device for one call with that many floating-point operations, or nullptr: compute on the processor. Opens the
   // device when that is still to be done.
   [[nodiscard]] OpenClDevice* device_for(KernelFamily family, double flops) const;
@@ -69,11 +72,15 @@ class Compute {
   // True when this device should run the `lanes` shape.
   [[nodiscard]] bool uses_lanes(const OpenClDevice& device) const;
 
+  // True when kernels with a double form should run it.
+  [[nodiscard]] bool uses_double(const OpenClDevice& device) const;
+
  private:
   struct State;
-  explicit Compute(std::shared_ptr<State> state, KernelVariant variant);
+  explicit Compute(std::shared_ptr<State> state);
   std::shared_ptr<State> state_;
   KernelVariant variant_ = KernelVariant::by_device;
+  bool may_use_double_ = true;
 };
 
 // Makes the BLAS library compute on the calling thread only; parallel work is divided by this library, over blocks

@@ -25,7 +25,8 @@ struct KernelDescriptor {
   std::vector<std::string> size_names;
   std::vector<Sizes> test_sizes;  // with 0, 1, the tiles' sizes and their neighbours, and odd ones
   Sizes bench_sizes;
-  double tolerance = 0;  // on Comparison::error
+  double tolerance = 0;         // on Comparison::error
+  double single_tolerance = 0;  // the same on a device without double, where that differs
   std::function<double(const Sizes&)> flops;
   std::function<double(const Sizes&)> bytes;  // read and written, each number once
   // Makes data from the seed, computes both and compares.

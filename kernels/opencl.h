@@ -24,6 +24,7 @@ extern const char* const covariance;
 extern const char* const dtw_groups;
 extern const char* const dtw_lanes;
 extern const char* const keyframe_distance;
+extern const char* const local_linear;
 extern const char* const projection;
 }  // namespace opencl_source
 
