@@ -15,23 +15,22 @@
 
 namespace kinespace {
 
-static_assert(std::endian::native == std::endian::little, "the formats are little-endian; port ByteWriter and ByteReader");
+static_assert(std::endian::native == std::endian::little,
+              "the formats are little-endian; port ByteWriter and ByteReader");
 
 using Bytes = std::vector<std::byte>;
 
 class ByteWriter {
  public:
   template <typename T>
-    requires std::is_arithmetic_v<T>
+  requires std::is_arithmetic_v<T>
   void put(T value) {
     const auto* raw = reinterpret_cast<const std::byte*>(&value);
     bytes_.insert(bytes_.end(), raw, raw + sizeof value);
   }
   template <typename T>
-    requires std::is_arithmetic_v<T>
-  void put_array(std::span<const T> values) {
-    put_bytes(std::as_bytes(values));
-  }
+  requires std::is_arithmetic_v<T>
+  void put_array(std::span<const T> values) { put_bytes(std::as_bytes(values)); }
   void put_bytes(std::span<const std::byte> raw) { bytes_.insert(bytes_.end(), raw.begin(), raw.end()); }
   // A 32-bit length, then the bytes.
   void put_string(std::string_view text) {
@@ -52,15 +51,13 @@ class ByteReader {
   ByteReader(std::span<const std::byte> bytes, std::string source) : bytes_(bytes), source_(std::move(source)) {}
 
   template <typename T>
-    requires std::is_arithmetic_v<T>
-  T get() {
+  requires std::is_arithmetic_v<T> T get() {
     T value;
     std::memcpy(&value, take(sizeof(T)).data(), sizeof(T));
     return value;
   }
   template <typename T>
-    requires std::is_arithmetic_v<T>
-  std::vector<T> get_array(std::uint64_t count) {
+  requires std::is_arithmetic_v<T> std::vector<T> get_array(std::uint64_t count) {
     if (count > remaining() / sizeof(T)) truncated(std::to_string(count) + " times " + std::to_string(sizeof(T)));
     std::vector<T> values(static_cast<std::size_t>(count));
     const auto raw = take(values.size() * sizeof(T));

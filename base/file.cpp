@@ -1,12 +1,5 @@
 #include "base/file.h"
 
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-#include <xxhash.h>
-
 #include <atomic>
 #include <cerrno>
 #include <cstdlib>
@@ -15,6 +8,13 @@
 #include <utility>
 #include <vector>
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <xxhash.h>
+
 #include "base/error.h"
 
 namespace kinespace {
@@ -22,9 +22,8 @@ namespace {
 
 [[noreturn]] void fail(ErrorKind kind, const std::filesystem::path& path, const std::string& what, int code,
                        const std::string& remedy) {
-  throw Error(kind, {.file = path.string(),
-                     .found = what + ": " + std::generic_category().message(code),
-                     .remedy = remedy});
+  throw Error(kind,
+              {.file = path.string(), .found = what + ": " + std::generic_category().message(code), .remedy = remedy});
 }
 
 // Closes a descriptor at the end of a scope.
@@ -70,8 +69,8 @@ void write_all(int fd, std::string_view content, const std::filesystem::path& pa
   }
 }
 
-// A new file beside the target, under a short name so that any target's name leaves room for it. Opened plainly, so that
-// its permissions are those of any new file.
+// A new file beside the target, under a short name so that any target's name leaves room for it. Opened plainly, so
+// that its permissions are those of any new file.
 int create_temporary(const std::filesystem::path& folder, std::string& name) {
   static std::atomic<unsigned> count{0};
   for (;;) {
@@ -174,6 +173,8 @@ std::string content_hash(std::span<const std::byte> bytes) {
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
 
-std::uint64_t checksum64(std::span<const std::byte> bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
+std::uint64_t checksum64(std::span<const std::byte> bytes) {
+  return XXH3_64bits(bytes.data(), bytes.size());
+}
 
 }  // namespace kinespace

@@ -2,8 +2,8 @@
 //
 // Reading checks the size before it allocates. Writing goes to a temporary file beside the target, is flushed to the
 // disk (fsync) and then renamed over it, so a reader sees the old file or the new one, never half of either; a full
-// disk or a killed process leaves the old file as it was. A link stays a link to the file it names, a file that was there
-// keeps its permissions, and a device (/dev/null, a pipe) is written to as it is.
+// disk or a killed process leaves the old file as it was. A link stays a link to the file it names, a file that was
+// there keeps its permissions, and a device (/dev/null, a pipe) is written to as it is.
 #pragma once
 
 #include <cstddef>
