@@ -242,6 +242,7 @@ TEST_F(LibraryBuildTest, vectors_that_cannot_stand_in_one_matrix_are_refused) {
 TEST_F(LibraryBuildTest, imports_come_from_several_threads) {
   LibraryBuild build(target_, {.fingerprint = "f", .imports_per_commit = 7});
   std::vector<std::jthread> threads;
+  threads.reserve(4);
   for (int t = 0; t < 4; ++t) {
     threads.emplace_back([&build, t] {
       for (int i = 0; i < 50; ++i) {
