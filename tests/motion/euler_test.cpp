@@ -42,15 +42,15 @@ TEST(Euler, quaternions_are_the_product_of_the_channels_from_left_to_right) {
   std::uniform_real_distribution<double> degrees(-720, 720);
   for (const auto& channels : all_orders()) {
     const EulerOrder order = euler_order(channels);
-    constexpr int count = 333;  // neither a block nor a multiple of one
+    constexpr std::size_t count = 333;  // neither a block nor a multiple of one
     std::vector<double> a(count), b(count), c(count), q(4 * count);
-    for (int i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       a[i] = degrees(random);
       b[i] = degrees(random);
       c[i] = degrees(random);
     }
     quaternions_from_euler(order, a.data(), b.data(), c.data(), count, q.data());
-    for (int i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       const Eigen::Quaterniond got(q[4 * i], q[4 * i + 1], q[4 * i + 2], q[4 * i + 3]);
       const Eigen::Quaterniond want = product(order, {a[i], b[i], c[i]});
       ASSERT_LT((got.coeffs() - want.coeffs()).norm(), 2e-15 * 8) << i;
@@ -78,7 +78,8 @@ TEST(Euler, angles_of_a_billion_degrees_are_still_accurate) {
 TEST(Euler, continuous_angles_give_continuous_quaternions) {
   const EulerOrder order = euler_order(all_orders()[4]);
   Eigen::Quaterniond before = quaternion(order, {-1000, -1000, -1000});
-  for (double a = -1000; a <= 1000; a += 0.5) {
+  for (int step = -2000; step <= 2000; ++step) {
+    const double a = 0.5 * step;
     const Eigen::Quaterniond q = quaternion(order, {a, a, a});
     ASSERT_LT((q.coeffs() - before.coeffs()).norm(), 0.02);
     before = q;

@@ -26,7 +26,12 @@ std::string long_bvh(int frames) {
       std::to_string(frames) + "\nFrame Time: 0.008333\n";
   for (int f = 0; f < frames; ++f) {
     const std::string whole = std::to_string(f % 1000);
-    text += whole + ".25 91.5 0 " + whole + ".125 -2.5 30.0625 10 " + whole + " -7\n";
+    text.append(whole)
+        .append(".25 91.5 0 ")
+        .append(whole)
+        .append(".125 -2.5 30.0625 10 ")
+        .append(whole)
+        .append(" -7\n");
   }
   return text;
 }
@@ -35,8 +40,8 @@ std::string long_amc(int frames) {
   std::string text = ":FULLY-SPECIFIED\n:DEGREES\n";
   for (int f = 0; f < frames; ++f) {
     const std::string whole = std::to_string(f % 1000);
-    text += std::to_string(f + 1) + "\nroot 0 " + whole + ".5 0 10 -20.25 " + whole + "\nfemur 5 -6 7.5\ntibia " +
-            whole + "\n";
+    text.append(std::to_string(f + 1)).append("\nroot 0 ").append(whole).append(".5 0 10 -20.25 ").append(whole);
+    text.append("\nfemur 5 -6 7.5\ntibia ").append(whole).append("\n");
   }
   return text;
 }

@@ -6,7 +6,8 @@
 
 namespace kinespace::test {
 
-// The folder with cmu/, bandai1/, bandai2/: $KINESPACE_DATA, else build/data of the checkout; nullopt when it is not there.
+// The folder with cmu/, bandai1/, bandai2/: $KINESPACE_DATA, else build/data of the checkout; nullopt when it is not
+// there.
 [[nodiscard]] std::optional<std::filesystem::path> data_folder();
 
 // The folder with the golden FPCA cases: $KINESPACE_GOLDEN, else ../shared/golden/fpca beside the checkout.
@@ -32,10 +33,10 @@ class TemporaryFolder {
 }  // namespace kinespace::test
 
 // Gives `variable` the folder, or ends the test: as a failure in CI, as a visible skip elsewhere.
-#define KINESPACE_REQUIRE_FOLDER(variable, lookup)                                                      \
-  const auto variable##_found = ::kinespace::test::lookup();                                            \
-  if (!variable##_found) {                                                                              \
-    if (::kinespace::test::data_required()) FAIL() << "the shared data is missing (" #lookup ")";       \
-    GTEST_SKIP() << "the shared data is not beside this checkout (" #lookup ")";                        \
-  }                                                                                                     \
-  const std::filesystem::path variable = *variable##_found
+#define KINESPACE_REQUIRE_FOLDER(variable, lookup)                                                \
+  const auto variable##_found = ::kinespace::test::lookup();                                      \
+  if (!variable##_found) {                                                                        \
+    if (::kinespace::test::data_required()) FAIL() << "the shared data is missing (" #lookup ")"; \
+    GTEST_SKIP() << "the shared data is not beside this checkout (" #lookup ")";                  \
+  }                                                                                               \
+  const std::filesystem::path& variable = *variable##_found
