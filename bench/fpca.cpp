@@ -5,13 +5,16 @@
 #include <cmath>
 #include <cstdlib>
 #include <ctime>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "bench/covariance_stream.h"
 #include "bench/report.h"
+#include "bench/space.h"
 #include <cblas.h>
 
 #include "fpca/curves.h"
@@ -75,7 +78,7 @@ void fill_generated(CurveMatrix& out) {
   std::mt19937 generator(1);
   const auto uniform = [&] { return static_cast<double>(generator()) / 4294967296.0 - 0.5; };
   for (Eigen::Index i = 0; i < out.rows(); ++i) {
-    std::array<double, 8> scores;
+    std::array<double, 8> scores{};
     for (std::size_t k = 0; k < scores.size(); ++k) scores[k] = uniform() * std::pow(0.5, static_cast<double>(k));
     for (int t = 0; t < curve_points; ++t) {
       out(i, t) = 0.02 * uniform();
@@ -201,9 +204,14 @@ void compare_golden(const fs::path& folder, BenchReport& report) {
 }  // namespace
 
 BenchReport bench_fpca(const BenchOptions& options) {
-  BenchReport report{.bench = "fpca", .device = "cpu", .threads = 1, .results = {}};
+  const Compute compute = Compute::open(options.device);
+  BenchReport report{.bench = "fpca", .device = "", .threads = 2, .results = {}};
   if (const auto golden = golden_folder(options)) compare_golden(*golden, report);
   measure_speed(options, report);
+  std::ranges::copy(bench_covariance_stream(compute), std::back_inserter(report.results));
+  basis_rows(options, report);
+  space_rows(options, compute, report);
+  report.device = compute.describe();
   return report;
 }
 

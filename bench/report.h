@@ -55,6 +55,5 @@ struct Bench {
 [[nodiscard]] BenchReport bench_fpca(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_io(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_retrieval(const BenchOptions& options);
-[[nodiscard]] BenchReport bench_space(const BenchOptions& options);
 
 }  // namespace kinespace
