@@ -17,10 +17,17 @@
 namespace kinespace {
 namespace {
 
-// Where "auto" leaves the processor: floating-point operations of one call. Measured on two AVX-512 cores with
-// PoCL 3.1, program already built; the bench `kernels` prints the crossing on another machine. `processor` is for
-// OpenCL devices that are processors (PoCL), `gpu` for the others, where the bound is the cost of moving the data.
-// Infinity: never.
+// Where "auto" leaves the processor: floating-point operations of one call. `processor`: OpenCL devices that are
+// processors, measured with PoCL 3.1 on two AVX-512 cores (GFLOP/s here / there, at the size named; `kinespace bench
+// dtw` prints the first on any machine):
+//   keyframe_distances  94 / 76    1000 x 1000 rows of 128      BLAS wins at every size
+//   dtw                 49 / 165   all pairs of 200 clips       from 16 pairs a query on, but the first call costs 0.1
+//   to
+//                                                               0.2 s for opening the device and its program
+//   covariance          125 / 43   1 000 000 x 128              BLAS wins at every size
+//   projection          64 / 24    100 000 x 128 x 20           BLAS wins at every size
+//   local_linear        a surface of 100 x 100 takes 1 ms here
+// `gpu`: the others; estimates, from data that cross a bus at 10 GB/s. Infinity: never.
 struct Threshold {
   KernelFamily family;
   double processor;
@@ -28,12 +35,12 @@ struct Threshold {
 };
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr std::array kThresholds{
-    Threshold{KernelFamily::keyframe_distances, kNever, 1e9}, Threshold{KernelFamily::dtw, 2e9, 2e9},
-    Threshold{KernelFamily::covariance, kNever, 1e10},        Threshold{KernelFamily::projection, kNever, 1e10},
-    Threshold{KernelFamily::local_linear, kNever, 1e10},
+    Threshold{KernelFamily::keyframe_distances, kNever, 1e10}, Threshold{KernelFamily::dtw, 5e9, 5e9},
+    Threshold{KernelFamily::covariance, kNever, 1e11},         Threshold{KernelFamily::projection, kNever, 1e11},
+    Threshold{KernelFamily::local_linear, kNever, 1e11},
 };
 // Below this nothing profits, so that a small call under "auto" need not even look for devices.
-constexpr double kSmallest = 1e9;
+constexpr double kSmallest = 5e9;
 
 std::optional<std::size_t> device_number(const std::string& choice) {
   const std::string prefix = "opencl:";

@@ -76,6 +76,16 @@ void normalise(const FeatureSet& queries, const FeatureSet& targets, std::span<c
   }
 }
 
+// Under "auto", pairs that have no clip in common leave most lanes of a processor's kernel empty: the plain form is
+// faster.
+OpenClDevice* device_for(const FeatureSet& queries, const FeatureSet& targets, std::span<const ClipPair> pairs,
+                         const Compute& compute) {
+  constexpr std::size_t fewest_lanes = 4;
+  auto* device = compute.device_for(KernelFamily::dtw, dtw_detail::flops(queries, targets, pairs));
+  if (device == nullptr || compute.choice() != "auto" || !compute.uses_lanes(*device)) return device;
+  return pairs.size() < fewest_lanes * dtw_detail::group_pairs(queries, targets, pairs).groups ? nullptr : device;
+}
+
 }  // namespace
 
 std::span<const float> FeatureSet::clip(int clip) const {
@@ -135,7 +145,7 @@ std::vector<DtwMatch> dtw(const FeatureSet& queries, const FeatureSet& targets, 
                           const DtwOptions& options, const Compute& compute) {
   check(queries, targets, pairs, options);
   std::vector<DtwMatch> matches(pairs.size());
-  auto* device = compute.device_for(KernelFamily::dtw, dtw_detail::flops(queries, targets, pairs));
+  auto* device = device_for(queries, targets, pairs, compute);
   if (device == nullptr) {
     dtw_detail::dtw_cpu(queries, targets, pairs, options, matches);
   } else {
@@ -184,6 +194,23 @@ std::int64_t Region::end_row(std::int64_t j) const {
   if (band >= 0 && m > 1) end = std::min(end, flooring(j * (n - 1) + band, m - 1) + 1);
   if (slope_limited) end = std::min({end, 2 * j + 2, n - (m - 1 - j) / 2});
   return end;
+}
+
+Grouping group_pairs(const FeatureSet& queries, const FeatureSet& targets, std::span<const ClipPair> pairs) {
+  std::vector<std::size_t> of_query(static_cast<std::size_t>(queries.clips()), 0);
+  std::vector<std::size_t> of_target(static_cast<std::size_t>(targets.clips()), 0);
+  for (const auto& pair : pairs) {
+    ++of_query[pair.query];
+    ++of_target[pair.target];
+  }
+  const auto groups = [](const std::vector<std::size_t>& counts) {
+    std::size_t sum = 0;
+    for (const auto count : counts) sum += (count + 15) / 16;
+    return sum;
+  };
+  const auto by_query = groups(of_query);
+  const auto by_target = groups(of_target);
+  return {.groups = std::min(by_query, by_target), .by_target = by_target < by_query};
 }
 
 double flops(const FeatureSet& queries, const FeatureSet& targets, std::span<const ClipPair> pairs) {

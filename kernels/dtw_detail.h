@@ -62,6 +62,15 @@ std::vector<FramePair> trace_back(int n, int m, bool slope_limited, const StepAt
 // The floating-point operations of the distances of all pairs.
 [[nodiscard]] double flops(const FeatureSet& queries, const FeatureSet& targets, std::span<const ClipPair> pairs);
 
+// How many groups of up to sixteen pairs with a clip in common there are, with queries or with targets in common,
+// whichever gives fewer.
+struct Grouping {
+  std::size_t groups = 0;
+  bool by_target = false;
+};
+[[nodiscard]] Grouping group_pairs(const FeatureSet& queries, const FeatureSet& targets,
+                                   std::span<const ClipPair> pairs);
+
 // One form per file. The processor's takes any pair; the device's leaves pairs that do not fit its memory or its 32-bit
 // arithmetic to `left_over` (indices into pairs).
 void dtw_cpu(const FeatureSet& queries, const FeatureSet& targets, std::span<const ClipPair> pairs,

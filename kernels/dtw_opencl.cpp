@@ -8,23 +8,6 @@ namespace {
 constexpr std::int64_t kLargestTable = std::int64_t{1} << 30;  // cells: the kernels compute positions in 32 bits
 constexpr int kLanes = 16;
 
-// How many groups of up to sixteen pairs there are when pairs with the same clip stand together.
-template <typename ClipOf>
-std::size_t group_count(std::span<const DevicePair> pairs, int clips, ClipOf clip_of) {
-  std::vector<std::size_t> counts(static_cast<std::size_t>(clips), 0);
-  for (const auto& pair : pairs) ++counts[static_cast<std::size_t>(clip_of(pair))];
-  std::size_t groups = 0;
-  for (const auto count : counts) groups += (count + kLanes - 1) / kLanes;
-  return groups;
-}
-
-// True when fewer groups come of gathering the pairs by target.
-bool better_transposed(std::span<const DevicePair> pairs, const FeatureSet& queries, const FeatureSet& targets) {
-  return group_count(pairs, targets.clips(), [](const DevicePair& pair) { return pair.target; }) <
-         group_count(
-             pairs, queries.clips(), [](const DevicePair& pair) { return pair.query; });
-}
-
 PackedClips pack(const FeatureSet& set, const std::vector<bool>& used) {
   PackedClips packed;
   packed.stride = (set.dims + kLanes - 1) / kLanes * kLanes;
@@ -111,7 +94,7 @@ void dtw_opencl(OpenClDevice& device, bool lanes, const FeatureSet& queries, con
                 std::vector<std::size_t>& left_over) {
   auto kept = pairs_for_device(queries, targets, pairs, options, left_over);
   if (kept.empty()) return;
-  const bool transposed = lanes && better_transposed(kept, queries, targets);
+  const bool transposed = lanes && group_pairs(queries, targets, pairs).by_target;
   if (transposed) {
     for (auto& pair : kept) std::swap(pair.query, pair.target);
   }

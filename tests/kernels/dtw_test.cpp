@@ -152,6 +152,27 @@ TEST(dtw, does_not_depend_on_threads) {
   for (std::size_t p = 0; p < pairs.size(); ++p) EXPECT_EQ(several[p].cost, single[p].cost);
 }
 
+// Large calls under "auto" go to the device, but not pairs that would leave most of its lanes empty.
+TEST(dtw, auto_takes_the_device_where_pairs_share_clips) {
+  if (list_devices().empty() || list_devices().front().type != "cpu") GTEST_SKIP() << "for PoCL";
+  const auto set = random_clips(std::vector<int>(16, 500), 1000, 15);
+  std::vector<ClipPair> apart;
+  std::vector<ClipPair> shared;
+  for (int c = 0; c < 16; c += 2) {
+    apart.push_back({c, c + 1});
+    shared.push_back({1, c});
+  }
+  const DtwOptions narrow{.band_fraction = 0.01};  // quick, but counted as whole tables
+  const auto costs = [&](const std::vector<ClipPair>& pairs, const char* choice) {
+    std::vector<double> out;
+    for (const auto& match : dtw(set, set, pairs, narrow, Compute::open(choice))) out.push_back(match.cost);
+    return out;
+  };
+  EXPECT_EQ(costs(apart, "auto"), costs(apart, "cpu"));
+  EXPECT_EQ(costs(shared, "auto"), costs(shared, "opencl"));
+  EXPECT_NE(costs(shared, "auto"), costs(shared, "cpu"));  // float against double
+}
+
 TEST(dtw, pairs_that_exceed_the_memory_for_paths_take_turns) {
   // 33 jobs of 700 x 700 cells need about 60 MB of back-pointers on a device; the limit is 1 MiB.
   const auto set = random_clips(std::vector<int>(34, 700), 1, 12);
