@@ -111,13 +111,7 @@ TEST(WriteClip, a_failed_write_leaves_the_old_file_and_nothing_else) {
 // A locale whose decimal point is a comma, made in a folder of its own, in force for one scope.
 class CommaLocale {
  public:
-  CommaLocale() {
-    const std::string make = "localedef -i de_DE -f UTF-8 '" + (folder_ / "de_DE.UTF-8").string() + "' 2>/dev/null";
-    static_cast<void>(std::system(make.c_str()));
-    setenv("LOCPATH", folder_.path().c_str(), 1);
-    in_force_ = std::setlocale(LC_ALL, "de_DE.UTF-8") != nullptr;
-    if (in_force_) std::locale::global(std::locale("de_DE.UTF-8"));
-  }
+  CommaLocale() : in_force_(enforce(folder_.path())) {}
   ~CommaLocale() {
     std::locale::global(std::locale::classic());
     std::setlocale(LC_ALL, "C");
@@ -128,8 +122,17 @@ class CommaLocale {
   [[nodiscard]] bool in_force() const { return in_force_; }
 
  private:
+  static bool enforce(const std::filesystem::path& folder) {
+    const std::string make = "localedef -i de_DE -f UTF-8 '" + (folder / "de_DE.UTF-8").string() + "' 2>/dev/null";
+    static_cast<void>(std::system(make.c_str()));
+    setenv("LOCPATH", folder.c_str(), 1);
+    if (std::setlocale(LC_ALL, "de_DE.UTF-8") == nullptr) return false;
+    std::locale::global(std::locale("de_DE.UTF-8"));
+    return true;
+  }
+
   TemporaryFolder folder_;
-  bool in_force_ = false;
+  bool in_force_;
 };
 
 TEST(Locale, a_comma_locale_changes_nothing_that_is_read_or_written) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 namespace kinespace::test {
 
@@ -34,9 +35,9 @@ class TemporaryFolder {
 
 // Gives `variable` the folder, or ends the test: as a failure in CI, as a visible skip elsewhere.
 #define KINESPACE_REQUIRE_FOLDER(variable, lookup)                                                \
-  const auto variable##_found = ::kinespace::test::lookup();                                      \
+  auto variable##_found = ::kinespace::test::lookup();                                            \
   if (!variable##_found) {                                                                        \
     if (::kinespace::test::data_required()) FAIL() << "the shared data is missing (" #lookup ")"; \
     GTEST_SKIP() << "the shared data is not beside this checkout (" #lookup ")";                  \
   }                                                                                               \
-  const std::filesystem::path& variable = *variable##_found
+  const std::filesystem::path variable = std::move(*variable##_found)
