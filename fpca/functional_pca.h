@@ -126,6 +126,8 @@ class FunctionalPcaWorkspace {
   ~FunctionalPcaWorkspace();
   FunctionalPcaWorkspace(FunctionalPcaWorkspace&&) noexcept;
   FunctionalPcaWorkspace& operator=(FunctionalPcaWorkspace&&) noexcept;
+  FunctionalPcaWorkspace(const FunctionalPcaWorkspace&) = delete;
+  FunctionalPcaWorkspace& operator=(const FunctionalPcaWorkspace&) = delete;
 
   // One curve a row. Throws Error{bad_input} for no curves or values that are not finite.
   [[nodiscard]] FunctionalPca fit(const CurveView& curves);

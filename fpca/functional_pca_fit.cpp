@@ -21,8 +21,8 @@ double position(int i, int n) {
 }
 
 std::vector<double> positions(int n) {
-  std::vector<double> out;
-  for (int i = 0; i < n; ++i) out.push_back(position(i, n));
+  std::vector<double> out(static_cast<std::size_t>(n));
+  for (int i = 0; i < n; ++i) out[static_cast<std::size_t>(i)] = position(i, n);
   return out;
 }
 

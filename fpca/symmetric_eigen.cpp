@@ -37,7 +37,7 @@ const Eigen::VectorXd& SymmetricEigen::decompose(const Eigen::MatrixXd& matrix) 
   tau_.resize(std::max(size_ - 1, 1));
   diagonal_.resize(size_);
   below_.setZero(std::max(size_, 1));
-  work_.resize(static_cast<std::size_t>(64 * size_ + 64));
+  work_.resize(64 * static_cast<std::size_t>(size_) + 64);
   int info = 0;
   const int work_size = static_cast<int>(work_.size());
   dsytrd_("L", &size_, reflectors_.data(), &size_, diagonal_.data(), below_.data(), tau_.data(), work_.data(),
@@ -68,8 +68,8 @@ const Eigen::MatrixXd& SymmetricEigen::vectors(int count) {
 
 // Of the tridiagonal matrix, in ascending order of their values.
 void SymmetricEigen::select_vectors(int count) {
-  integers_.resize(static_cast<std::size_t>(10 * size_ + 1));
-  support_.resize(static_cast<std::size_t>(2 * count + 2));
+  integers_.resize(10 * static_cast<std::size_t>(size_) + 1);
+  support_.resize(2 * static_cast<std::size_t>(count) + 2);
   scratch_diagonal_ = diagonal_;
   scratch_below_ = below_;
   scratch_values_.resize(size_);

@@ -4,6 +4,7 @@
 #include <thread>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
@@ -112,6 +113,7 @@ TEST(CurveMoments, have_the_same_bits_in_any_thread) {
   std::vector<Eigen::MatrixXd> together(4);
   {
     std::vector<std::jthread> threads;
+    threads.reserve(together.size());
     for (auto& out : together) threads.emplace_back([&] { out = moments_of(y).scatter(); });
   }
   for (const auto& scatter : together) EXPECT_EQ(scatter, alone);

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <string>
 #include <thread>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
@@ -184,6 +186,7 @@ TEST(FunctionalPca, has_the_same_bits_in_any_thread_and_from_a_used_workspace) {
   std::vector<CurveMatrix> together(3);
   {
     std::vector<std::jthread> threads;
+    threads.reserve(together.size());
     for (auto& out : together) threads.emplace_back([&] { out = fit_functional_pca(y, options).scores(y); });
   }
   for (const auto& scores : together) EXPECT_EQ(scores, alone);

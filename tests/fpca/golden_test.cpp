@@ -1,7 +1,9 @@
 #include "fpca/golden.h"
 
 #include <fstream>
+#include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"

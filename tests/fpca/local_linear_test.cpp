@@ -1,6 +1,7 @@
 #include "kernels/local_linear.h"
 
 #include <cmath>
+#include <vector>
 
 #include <Eigen/QR>
 #include <gtest/gtest.h>
@@ -48,8 +49,8 @@ TEST(LocalLinear, kernels_integrate_to_one) {
 }
 
 TEST(LocalLinear, a_line_stays_a_line_up_to_its_ends) {
-  std::vector<double> values;
-  for (int i = 0; i < 30; ++i) values.push_back(3 - 2 * place(i, 30));
+  std::vector<double> values(30);
+  for (int i = 0; i < 30; ++i) values[static_cast<std::size_t>(i)] = 3 - 2 * place(i, 30);
   const std::vector<double> at = {0, 0.013, 0.5, 1};
   for (const SmoothingKernel kernel : all_kernels) {
     const auto out = local_linear_line(values, {}, kernel, 0.1, at);

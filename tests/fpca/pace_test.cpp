@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/error.h"
@@ -153,7 +154,7 @@ TEST(WorkGrid, of_a_linear_surface_changes_nothing_but_the_points) {
   const FunctionalPca f = fit_functional_pca(y, {.mode = FpcaMode::pace, .count = 2, .work_points = 11});
   ASSERT_EQ(f.functions.rows(), 11);
   EXPECT_EQ(f.observed_functions.rows(), 21);
-  for (int t = 0; t < 11; ++t) EXPECT_NEAR(f.mean[t], f.observed_mean[2 * t], 1e-12);
+  for (int t = 0; t < 11; ++t) EXPECT_NEAR(f.mean[t], f.observed_mean[Eigen::Index{2} * t], 1e-12);
   EXPECT_LE((f.observed_functions(Eigen::seqN(0, 11, 2), Eigen::all) - f.functions).cwiseAbs().maxCoeff(), 1e-12);
   const Eigen::RowVectorXd mean = y.colwise().mean();
   const Eigen::MatrixXd centred = y.rowwise() - mean;

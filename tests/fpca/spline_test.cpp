@@ -1,6 +1,8 @@
 #include "fpca/spline.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -15,8 +17,8 @@ double cubic(double x) {
 
 TEST(Spline, with_four_point_ends_reproduces_a_cubic) {
   const std::vector<double> x = {0, 0.3, 0.5, 1.1, 1.2, 2}, at = {0, 0.1, 0.77, 1.9, 2, 2.3};
-  std::vector<double> y;
-  for (const double v : x) y.push_back(cubic(v));
+  std::vector<double> y(x.size());
+  std::transform(x.begin(), x.end(), y.begin(), cubic);
   const auto out = interpolate_spline(x, y, at);
   for (std::size_t i = 0; i < at.size(); ++i) EXPECT_NEAR(out[i], cubic(at[i]), 1e-11);
   const auto natural = interpolate_spline(x, y, at, SplineEnds::natural);
