@@ -1,9 +1,9 @@
-#include <fmt/format.h>
-
 #include <chrono>
 #include <filesystem>
 #include <memory>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
@@ -70,7 +70,8 @@ void add_build(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("build", "Make a motion-space library of clips");
   const auto options = std::make_shared<BuildOptions>();
   LibraryBuilderOptions& library = options->library;
-  command->add_option("CLIPS", options->inputs, "Clips (.bvh, .amc), or folders with clips anywhere below them")->required();
+  command->add_option("CLIPS", options->inputs, "Clips (.bvh, .amc), or folders with clips anywhere below them")
+      ->required();
   command->add_option("-o,--output", options->output, "The library to make, LIB.kspace")->required();
   command->add_flag("--add", library.add, "Add to the library that is there instead of replacing it");
   command->add_flag("--by-skeleton", library.by_skeleton, "One space for each joint tree, where clips have several");
@@ -78,7 +79,8 @@ void add_build(CLI::App& app, Session& session) {
   command->add_option("--variance", library.space.space.variance_share, "Share of variance the functions must cover")
       ->capture_default_str();
   command->add_option("--functions", options->functions, "This many functions instead")->check(CLI::PositiveNumber);
-  command->add_option("--points", library.space.space.points, "Points of a sequence's time grid (0: from the frame rate)")
+  command
+      ->add_option("--points", library.space.space.points, "Points of a sequence's time grid (0: from the frame rate)")
       ->capture_default_str();
   command->add_option("--grouping", options->grouping, "Which curves share functions: all, component or joint")
       ->check(CLI::IsMember({"all", "component", "joint"}))

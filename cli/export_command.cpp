@@ -1,8 +1,8 @@
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <memory>
 #include <optional>
+
+#include <fmt/format.h>
 
 #include "base/file.h"
 #include "cli/commands.h"
@@ -50,7 +50,8 @@ void add_export(CLI::App& app, Session& /*session*/) {
   command->add_option("LIB", options->library, "The library")->required();
   command->add_option("CLIP", options->clip, "The clip's name")->required();
   command->add_option("-o,--output", options->output, "The file to write: .bvh, .amc, .glb or .gltf")->required();
-  CLI::Option* lod = command->add_option("--lod", options->functions, "Use only the first N functions")->check(CLI::NonNegativeNumber);
+  CLI::Option* lod =
+      command->add_option("--lod", options->functions, "Use only the first N functions")->check(CLI::NonNegativeNumber);
   command->add_option("--max-error", options->max_error_cm, "The fewest functions with every joint this near, in cm")
       ->check(CLI::NonNegativeNumber)
       ->excludes(lod);

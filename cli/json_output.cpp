@@ -12,7 +12,7 @@ std::string shown(const Json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_null()) return "-";
   if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
-  if (value.is_array()) return fmt::format("{} entries", value.size());
+  if (value.is_array()) return std::to_string(value.size());
   return value.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

@@ -10,8 +10,12 @@ namespace kinespace::cli {
 namespace {
 
 constexpr int bar_width = 30;
-constexpr int log_step_percent = 10;
 constexpr std::chrono::milliseconds redraw_every{100};
+constexpr std::chrono::seconds log_every{2};
+
+bool is_terminal(std::FILE* stream) {
+  return ::isatty(::fileno(stream)) == 1;
+}
 
 int to_percent(double done) {
   if (!(done > 0)) return 0;  // also NaN
@@ -20,9 +24,12 @@ int to_percent(double done) {
 
 }  // namespace
 
-ProgressBar::ProgressBar(std::FILE* out) : ProgressBar(out, ::isatty(::fileno(out)) == 1) {}
+ProgressBar::ProgressBar(std::FILE* out)
+    : ProgressBar(out, is_terminal(out),
+                  is_terminal(out) ? Clock::duration(redraw_every) : Clock::duration(log_every)) {}
 
-ProgressBar::ProgressBar(std::FILE* out, bool terminal) : out_(out), terminal_(terminal) {}
+ProgressBar::ProgressBar(std::FILE* out, bool terminal, Clock::duration every)
+    : out_(out), terminal_(terminal), every_(every) {}
 
 ProgressBar::~ProgressBar() {
   if (open_line_) std::fputc('\n', out_);
@@ -33,15 +40,12 @@ void ProgressBar::show(std::string_view stage, double done) {
   const int percent = to_percent(done);
   const bool new_stage = stage != stage_;
   if (!new_stage && percent <= percent_) return;
-  if (terminal_) {
-    const auto now = std::chrono::steady_clock::now();
-    if (!new_stage && percent < 100 && now - drawn_ < redraw_every) return;
-    drawn_ = now;
-    draw_bar(stage, percent);
-  } else {
-    if (!new_stage && percent < 100 && percent / log_step_percent == percent_ / log_step_percent) return;
-    draw_line(stage, percent);
-  }
+  // A bar shows every stage from its beginning to its end; a log only what takes long.
+  const bool always = terminal_ && (new_stage || percent == 100);
+  const auto now = Clock::now();
+  if (!always && now - shown_ < every_) return;
+  terminal_ ? draw_bar(stage, percent) : draw_line(stage, percent);
+  shown_ = now;
   stage_ = stage;
   percent_ = percent;
 }

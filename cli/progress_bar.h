@@ -1,5 +1,6 @@
-// How far the work is, for whoever watches: a bar that redraws itself on a terminal, a plain line per stage and tenth
-// in a log file. Both go to standard error, so that results on standard output stay clean.
+// How far the work is, for whoever watches: a bar that redraws itself on a terminal; in a log file a plain line every
+// few seconds, so that short work leaves none. Both go to standard error, so that results on standard output stay
+// clean.
 #pragma once
 
 #include <chrono>
@@ -12,9 +13,12 @@ namespace kinespace::cli {
 
 class ProgressBar {
  public:
-  // `terminal` decides between the two forms; the default asks the stream.
+  using Clock = std::chrono::steady_clock;
+
+  // The bar if the stream is a terminal, redrawn at most every 0.1 s; else lines, one every 2 s at most.
   explicit ProgressBar(std::FILE* out);
-  ProgressBar(std::FILE* out, bool terminal);
+  // The form and the least time between two showings.
+  ProgressBar(std::FILE* out, bool terminal, Clock::duration every);
   // Ends the bar's line, so that what is printed next starts on a line of its own.
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
@@ -29,11 +33,12 @@ class ProgressBar {
 
   std::FILE* out_;
   bool terminal_;
+  Clock::duration every_;
   std::mutex mutex_;
   std::string stage_;
   int percent_ = -1;
   bool open_line_ = false;
-  std::chrono::steady_clock::time_point drawn_;
+  Clock::time_point shown_ = Clock::now();
 };
 
 }  // namespace kinespace::cli

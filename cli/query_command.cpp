@@ -1,7 +1,7 @@
-#include <fmt/format.h>
-
 #include <filesystem>
 #include <memory>
+
+#include <fmt/format.h>
 
 #include "base/error.h"
 #include "cli/commands.h"
@@ -24,8 +24,12 @@ struct QueryCommandOptions {
 Json to_json(const std::string& query, const std::vector<Match>& matches) {
   Json list = Json::array();
   for (const Match& match : matches) {
-    list.push_back({{"clip", match.clip}, {"distance", match.distance}, {"vector_distance", match.vector_distance},
-                    {"start_s", match.start_s}, {"end_s", match.end_s}, {"labels", match.labels}});
+    list.push_back({{"clip", match.clip},
+                    {"distance", match.distance},
+                    {"vector_distance", match.vector_distance},
+                    {"start_s", match.start_s},
+                    {"end_s", match.end_s},
+                    {"labels", match.labels}});
   }
   return {{"query", query}, {"matches", std::move(list)}};
 }
@@ -36,24 +40,30 @@ void print_matches(const std::vector<Match>& matches) {
     return;
   }
   fmt::print("{:>10}  {:>8}  clip\n", "distance", "seconds");
-  for (const Match& match : matches) fmt::print("{:>10.5f}  {:>8.2f}  {}\n", match.distance, match.end_s - match.start_s, match.clip);
+  for (const Match& match : matches)
+    fmt::print("{:>10.5f}  {:>8.2f}  {}\n", match.distance, match.end_s - match.start_s, match.clip);
 }
 
 // A file where there is one of that name and a clip reader for it, else a clip of the library.
-bool is_file(const std::string& text) { return is_motion_file(text) && std::filesystem::exists(text); }
+bool is_file(const std::string& text) {
+  return is_motion_file(text) && std::filesystem::exists(text);
+}
 
 std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute) {
   if (is_file(options.clip)) {
     const Clip clip = read_clip(options.clip);
     if (!library.space_for(clip.skeleton)) {
-      throw Error(ErrorKind::bad_input, {.file = options.clip, .found = "a skeleton that the library has no clips of",
-                                         .expected = "the joint names, parents and channels of its clips",
-                                         .remedy = "kinespace build --add --by-skeleton adds clips of another skeleton"});
+      throw Error(ErrorKind::bad_input,
+                  {.file = options.clip,
+                   .found = "a skeleton that the library has no clips of",
+                   .expected = "the joint names, parents and channels of its clips",
+                   .remedy = "kinespace build --add --by-skeleton adds clips of another skeleton"});
     }
     return nearest_motions(library, clip, options.query, {}, compute);
   }
   const ClipRow row = library.require_clip(options.clip);
-  return nearest_motions(library, library.curves(row), library.skeleton(row.skeleton_id), options.query, row.name, compute);
+  return nearest_motions(library, library.curves(row), library.skeleton(row.skeleton_id), options.query, row.name,
+                         compute);
 }
 
 void run_query(QueryCommandOptions options) {
@@ -73,7 +83,8 @@ void add_query(CLI::App& app, Session& /*session*/) {
   command->add_option("CLIP", options->clip, "A clip of the library by its name, or a file (.bvh, .amc)")->required();
   command->add_option("-k", options->query.k, "How many")->capture_default_str();
   command->add_flag("--no-rerank,!--rerank", options->no_rerank, "Order by the motion vectors alone, without DTW");
-  command->add_option("--candidates", options->query.candidates, "How many the DTW orders again")->capture_default_str();
+  command->add_option("--candidates", options->query.candidates, "How many the DTW orders again")
+      ->capture_default_str();
   command->add_flag("--weighted", options->query.weighted, "Joint weights in the vector distance");
   command->add_option("--label", options->query.labels, "Only clips with this label; may be given again");
   command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();

@@ -1,9 +1,12 @@
 // What stands around the command: odd file names, a comma locale, a terminal or a log, signals.
+#include <algorithm>
+#include <chrono>
 #include <clocale>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,6 +22,7 @@
 namespace kinespace::test {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -85,11 +89,12 @@ TEST(Surroundings, a_program_that_set_a_comma_locale_may_use_the_library) {
   EXPECT_LT(compare(before, again).max_joint_error_cm, 1e-4);
 }
 
-std::string shown(bool terminal, const std::function<void(cli::ProgressBar&)>& work) {
+std::string shown(bool terminal, cli::ProgressBar::Clock::duration every,
+                  const std::function<void(cli::ProgressBar&)>& work) {
   std::FILE* file = std::tmpfile();
   EXPECT_NE(file, nullptr);
   {
-    cli::ProgressBar bar(file, terminal);
+    cli::ProgressBar bar(file, terminal, every);
     work(bar);
   }
   std::string text(static_cast<std::size_t>(std::ftell(file)), '\0');
@@ -99,27 +104,27 @@ std::string shown(bool terminal, const std::function<void(cli::ProgressBar&)>& w
   return text;
 }
 
-TEST(Surroundings, a_log_gets_a_plain_line_per_stage_and_tenth) {
-  const std::string log = shown(false, [](cli::ProgressBar& bar) {
-    for (int i = 0; i <= 1000; ++i) bar.show("align", i / 1000.0);
-    bar.show("analyse", 0.55);
-  });
-  std::string expected;
-  for (int percent = 0; percent <= 100; percent += 10)
-    expected += "kinespace: align " + std::to_string(percent) + " %\n";
-  EXPECT_EQ(log, expected + "kinespace: analyse 55 %\n");
+void align_and_analyse(cli::ProgressBar& bar) {
+  for (int i = 0; i <= 1000; ++i) bar.show("align", i / 1000.0);
+  bar.show("analyse", 0.55);
+  bar.show("analyse", 0.5);  // late news from another thread
 }
 
-TEST(Surroundings, a_terminal_gets_a_bar_that_redraws_its_line) {
-  const std::string text = shown(true, [](cli::ProgressBar& bar) {
-    bar.show("align", 0);
-    bar.show("align", 1);
-    bar.show("align", 0.5);  // late news from another thread
-  });
+TEST(Surroundings, a_log_gets_plain_lines_of_work_that_takes_long) {
+  std::string expected;
+  for (int percent = 0; percent <= 100; ++percent) expected += "kinespace: align " + std::to_string(percent) + " %\n";
+  expected += "kinespace: analyse 55 %\n";
+  EXPECT_EQ(shown(false, std::chrono::seconds(0), align_and_analyse), expected);
+  EXPECT_EQ(shown(false, std::chrono::hours(1), align_and_analyse), "");
+}
+
+TEST(Surroundings, a_terminal_gets_a_bar_a_stage_that_redraws_its_line) {
+  const std::string text = shown(true, std::chrono::hours(1), align_and_analyse);
   EXPECT_THAT(text, StartsWith("\ralign "));
-  EXPECT_THAT(text, HasSubstr("] 100 %\n"));
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
-  EXPECT_EQ(std::count(text.begin(), text.end(), '\r'), 2);
+  EXPECT_THAT(text, HasSubstr("] 100 %\n\ranalyse"));
+  EXPECT_THAT(text, EndsWith("]  55 %\n"));
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 2);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\r'), 3);
 }
 
 TEST(Surroundings, a_signal_stops_work_that_polls_its_progress) {
