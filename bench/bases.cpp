@@ -1,7 +1,5 @@
-// How many functions the same error takes: the functional PCA of the curves, Fourier series, Legendre polynomials. Part of
-// `kinespace bench fpca`.
-#include <fmt/format.h>
-
+// How many functions the same error takes: the functional PCA of the curves, Fourier series, Legendre polynomials. Part
+// of `kinespace bench fpca`.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,8 @@
 #include <vector>
 
 #include "bench/space.h"
+#include <fmt/format.h>
+
 #include "fpca/analytic_basis.h"
 #include "fpca/library_builder.h"
 #include "fpca/space_builder.h"
@@ -81,7 +81,7 @@ int functions_needed(const CurveMatrix& coefficients, Eigen::VectorXd energy, do
 
 // All coefficients of the curves of one component, in the three bases.
 struct Coefficients {
-  std::array<CurveMatrix, 3> values;     // ours, Fourier, Legendre
+  std::array<CurveMatrix, 3> values;  // ours, Fourier, Legendre
   std::array<Eigen::VectorXd, 3> energy;
   double rms = 0;  // of the curves
 };
@@ -106,7 +106,8 @@ void add_rows(const std::string& data, const Components& curves, bool bars, cons
   for (const CurveMatrix& component : curves) {
     const Coefficients c = expand(component);
     for (std::size_t t = 0; t < tolerances.size(); ++t) {
-      for (std::size_t b = 0; b < 3; ++b) totals[t][b] += functions_needed(c.values[b], c.energy[b], tolerances[t] * c.rms);
+      for (std::size_t b = 0; b < 3; ++b)
+        totals[t][b] += functions_needed(c.values[b], c.energy[b], tolerances[t] * c.rms);
     }
   }
   for (std::size_t t = 0; t < tolerances.size(); ++t) {
@@ -120,7 +121,8 @@ void add_rows(const std::string& data, const Components& curves, bool bars, cons
     add("functions, Fourier (paper: 476)", fourier, "functions", {});
     add("functions, Legendre (paper: 293)", legendre, "functions", {});
     add("ours over Fourier", static_cast<double>(ours) / fourier, "x", judged ? std::optional(1.0 / 4) : std::nullopt);
-    add("ours over Legendre", static_cast<double>(ours) / legendre, "x", judged ? std::optional(1.0 / 3) : std::nullopt);
+    add("ours over Legendre", static_cast<double>(ours) / legendre, "x",
+        judged ? std::optional(1.0 / 3) : std::nullopt);
   }
 }
 

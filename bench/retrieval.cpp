@@ -1,8 +1,5 @@
-// `kinespace bench retrieval`: do queries make sense - leave-one-out nearest-neighbour accuracy on labelled clips, beside two
-// plain methods on the same data in the same run.
-#include <fmt/format.h>
-#include <tbb/parallel_for.h>
-
+// `kinespace bench retrieval`: do queries make sense - leave-one-out nearest-neighbour accuracy on labelled clips,
+// beside two plain methods on the same data in the same run.
 #include <algorithm>
 #include <charconv>
 #include <chrono>
@@ -13,8 +10,11 @@
 #include <numeric>
 #include <vector>
 
-#include "base/error.h"
 #include "bench/report.h"
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "base/error.h"
 #include "fpca/clip_space.h"
 #include "fpca/library_builder.h"
 #include "fpca/pose_features.h"
@@ -60,7 +60,8 @@ struct Accuracy {
   double style = 0;
 };
 
-// Share of clips whose nearest other clip, by `nearest`, has the same content, and the same content and style; in percent.
+// Share of clips whose nearest other clip, by `nearest`, has the same content, and the same content and style; in
+// percent.
 Accuracy accuracy(const Labelled& data, const std::function<std::size_t(std::size_t)>& nearest) {
   std::vector<std::size_t> answer(data.clips.size());
   tbb::parallel_for(std::size_t{0}, answer.size(), [&](std::size_t i) { answer[i] = nearest(i); });
@@ -109,9 +110,8 @@ Vectors resampled_vectors(const Labelled& data, const ClipSpace& space) {
 
 FeatureSet keyframes_of(const Labelled& data) {
   std::vector<PoseFeatures> features(data.clips.size());
-  tbb::parallel_for(std::size_t{0}, features.size(), [&](std::size_t i) {
-    features[i] = pose_features(data.clips[i].curves, data.clips[i].skeleton);
-  });
+  tbb::parallel_for(std::size_t{0}, features.size(),
+                    [&](std::size_t i) { features[i] = pose_features(data.clips[i].curves, data.clips[i].skeleton); });
   FeatureSet out{.dims = features.front().dims};
   for (const PoseFeatures& f : features) out.add(f.values);
   return out;
@@ -120,7 +120,8 @@ FeatureSet keyframes_of(const Labelled& data) {
 // The plain second method: DTW of every pair. [query][target], normalised costs.
 std::vector<float> all_costs(const FeatureSet& features, const Compute& compute) {
   const int n = features.clips();
-  std::vector<float> out(static_cast<std::size_t>(n) * static_cast<std::size_t>(n), std::numeric_limits<float>::infinity());
+  std::vector<float> out(static_cast<std::size_t>(n) * static_cast<std::size_t>(n),
+                         std::numeric_limits<float>::infinity());
   const auto pairs = all_pairs(n);
   constexpr std::size_t block = 100000;
   for (std::size_t start = 0; start < pairs.size(); start += block) {
@@ -137,8 +138,8 @@ std::vector<float> all_costs(const FeatureSet& features, const Compute& compute)
 }
 
 // The nearest by DTW, of all others or of the `candidates` nearest vectors.
-std::size_t nearest_by_cost(const Labelled& data, const std::vector<float>& costs, const Vectors* vectors, std::size_t candidates,
-                            std::size_t i, bool far) {
+std::size_t nearest_by_cost(const Labelled& data, const std::vector<float>& costs, const Vectors* vectors,
+                            std::size_t candidates, std::size_t i, bool far) {
   const std::size_t n = data.clips.size();
   std::vector<std::size_t> order;
   for (std::size_t j = 0; j < n; ++j) {
@@ -167,13 +168,16 @@ class Rows {
   explicit Rows(BenchReport& report) : report_(report) {}
   void add(const std::string& method, bool far, const Accuracy& a, const Accuracy* floor) {
     const std::string how = far ? ", far" : "";
-    add_one(method + ", by content" + how, a.content, floor != nullptr ? std::optional(floor->content - 1.5) : std::nullopt);
-    add_one(method + ", by content and style" + how, a.style, floor != nullptr ? std::optional(floor->style - 1.5) : std::nullopt);
+    add_one(method + ", by content" + how, a.content,
+            floor != nullptr ? std::optional(floor->content - 1.5) : std::nullopt);
+    add_one(method + ", by content and style" + how, a.style,
+            floor != nullptr ? std::optional(floor->style - 1.5) : std::nullopt);
   }
 
  private:
   void add_one(const std::string& name, double value, std::optional<double> bar) {
-    report_.results.push_back({.name = name, .data = "bandai2", .value = value, .unit = "%", .bar = bar, .higher_is_better = true});
+    report_.results.push_back(
+        {.name = name, .data = "bandai2", .value = value, .unit = "%", .bar = bar, .higher_is_better = true});
   }
   BenchReport& report_;
 };
@@ -187,7 +191,8 @@ BenchReport bench_retrieval(const BenchOptions& options) {
   for (const PreparedClip& clip : data.clips) orientations.add(clip.curves.values);
   const ClipSpace space = ClipSpace::build(source_of(data.clips), orientations.references());
   Vectors vectors(data.clips.size());
-  tbb::parallel_for(std::size_t{0}, vectors.size(), [&](std::size_t i) { vectors[i] = space.vector_of(data.clips[i].curves); });
+  tbb::parallel_for(std::size_t{0}, vectors.size(),
+                    [&](std::size_t i) { vectors[i] = space.vector_of(data.clips[i].curves); });
   const Vectors plain = resampled_vectors(data, space);
   const std::vector<float> costs = all_costs(keyframes_of(data), compute);
 
@@ -195,10 +200,13 @@ BenchReport bench_retrieval(const BenchOptions& options) {
   Rows rows(report);
   for (const bool far : {false, true}) {
     const Accuracy l2 = accuracy(data, [&](std::size_t i) { return nearest_vector(data, plain, i, far); });
-    const Accuracy dtw_all = accuracy(data, [&](std::size_t i) { return nearest_by_cost(data, costs, nullptr, 0, i, far); });
+    const Accuracy dtw_all =
+        accuracy(data, [&](std::size_t i) { return nearest_by_cost(data, costs, nullptr, 0, i, far); });
     const Accuracy ours = accuracy(data, [&](std::size_t i) { return nearest_vector(data, vectors, i, far); });
-    const Accuracy reranked = accuracy(data, [&](std::size_t i) { return nearest_by_cost(data, costs, &vectors, 50, i, far); });
-    // What the literature's plain methods reached on the whole of this dataset; bars are on the better of that and this run.
+    const Accuracy reranked =
+        accuracy(data, [&](std::size_t i) { return nearest_by_cost(data, costs, &vectors, 50, i, far); });
+    // What the literature's plain methods reached on the whole of this dataset; bars are on the better of that and this
+    // run.
     rows.add("resampled curves, L2", far, l2, nullptr);
     rows.add("DTW with all", far, dtw_all, nullptr);
     rows.add("motion vectors", far, ours, &l2);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "bench/report.h"
+
 #include "kernels/device.h"
 
 namespace kinespace {

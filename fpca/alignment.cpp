@@ -1,12 +1,12 @@
 #include "fpca/alignment.h"
 
-#include <fmt/format.h>
-
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+
+#include <Eigen/QR>
+#include <fmt/format.h>
 
 #include "base/error.h"
 
@@ -31,7 +31,8 @@ void AlignmentOptions::validate() const {
 }
 
 WarpSearch::WarpSearch(const MotionSpace& space, const AlignmentOptions& options)
-    : options_(options), curves_(space.curves()),
+    : options_(options),
+      curves_(space.curves()),
       mean_(search_points),
       root_weight_(search_points),
       curve_weight_(curve_weights(space.skeleton()).cast<float>()) {
@@ -50,15 +51,16 @@ WarpSearch::WarpSearch(const MotionSpace& space, const AlignmentOptions& options
   }
   mean_ = at.col(0).cast<float>();
   const Eigen::MatrixXd sampled = at.rightCols(n);
-  const Eigen::MatrixXd q = Eigen::HouseholderQR<Eigen::MatrixXd>(sampled).householderQ() *
-                            Eigen::MatrixXd::Identity(search_points, n);
+  const Eigen::MatrixXd q =
+      Eigen::HouseholderQR<Eigen::MatrixXd>(sampled).householderQ() * Eigen::MatrixXd::Identity(search_points, n);
   functions_ = q.cast<float>();
   root_weight_ = weight.cast<float>();
 }
 
 WarpSearch::Scratch WarpSearch::prepare(const RunSampler& run, int first, int last) const {
   Scratch scratch;
-  scratch.own = run.sample(first, last, Warp(), own_time_points).cast<float>().array().rowwise() * curve_weight_.array();
+  scratch.own =
+      run.sample(first, last, Warp(), own_time_points).cast<float>().array().rowwise() * curve_weight_.array();
   scratch.projection.resize(functions_.cols(), curves_);
   scratch.row.resize(curves_);
   return scratch;

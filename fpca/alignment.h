@@ -1,21 +1,22 @@
-// Time alignment of sequences (yoo2019, section 5.2): for each a warp under which the first few functions of the space leave
-// least of it.
+// Time alignment of sequences (yoo2019, section 5.2): for each a warp under which the first few functions of the space
+// leave least of it.
 //
-// A warp is proposed by dynamic time warping (keyframe distance, slopes in [1/2, 2]) to the template of the sequence's group,
-// and both that proposal and the identity are refined by descent on the warp's coefficients. What is minimised is what the
-// paper aligns for, the part of the curves that the first n functions do not reach,
+// A warp is proposed by dynamic time warping (keyframe distance, slopes in [1/2, 2]) to the template of the sequence's
+// group, and both that proposal and the identity are refined by descent on the warp's coefficients. What is minimised
+// is what the paper aligns for, the part of the curves that the first n functions do not reach,
 //
 //   E_n(h) = integral sum_c w_c^2 |(I - P_n)(f_c(h(s)) - mu(s))|^2 ds,      P_n: projection on the first n functions,
 //
-// with weights that turn curves into how far they move the joints: for a quaternion twice the root mean square over all joints
-// of their distance below it (0 for those that are not), for the velocity 0.1 s. It is minimised
-// at two levels of detail at once: the product E_n E_2n, so that neither is bought with the other. The identity stays unless
-// the best warp takes at least `least_gain` of the geometric mean of the two.
+// with weights that turn curves into how far they move the joints: for a quaternion twice the root mean square over all
+// joints of their distance below it (0 for those that are not), for the velocity 0.1 s. It is minimised at two levels
+// of detail at once: the product E_n E_2n, so that neither is bought with the other. The identity stays unless the best
+// warp takes at least `least_gain` of the geometric mean of the two.
 #pragma once
 
-#include <Eigen/Core>
 #include <span>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "fpca/encoding.h"
 #include "fpca/motion_space.h"
@@ -57,9 +58,9 @@ class WarpSearch {
 
   AlignmentOptions options_;
   int curves_;
-  Eigen::VectorXf mean_;       // at the search's points, times the root of their weight
-  Eigen::Index coarse_ = 0;    // n
-  Row functions_;              // [point][function], 2n of them, orthonormal columns under the plain dot product
+  Eigen::VectorXf mean_;     // at the search's points, times the root of their weight
+  Eigen::Index coarse_ = 0;  // n
+  Row functions_;            // [point][function], 2n of them, orthonormal columns under the plain dot product
   Eigen::VectorXf root_weight_;
   Eigen::RowVectorXf curve_weight_;  // w_c
 };
@@ -67,8 +68,8 @@ class WarpSearch {
 // w_c of the curves of a skeleton, in metres per unit of the curve.
 [[nodiscard]] Eigen::RowVectorXd curve_weights(const Skeleton& skeleton);
 
-// Groups of similar sequences: `count` templates spread over all of them (farthest first, from the one nearest to the mean;
-// no random choice), and for each sequence the template nearest to it.
+// Groups of similar sequences: `count` templates spread over all of them (farthest first, from the one nearest to the
+// mean; no random choice), and for each sequence the template nearest to it.
 struct TemplateGroups {
   std::vector<int> templates;  // indices of sequences
   std::vector<int> group;      // for each sequence an index into templates

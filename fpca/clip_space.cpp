@@ -1,11 +1,11 @@
 #include "fpca/clip_space.h"
 
-#include <fmt/format.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "base/error.h"
 #include "storage/bitstream.h"
@@ -30,14 +30,14 @@ SampleMatrix clip_samples(const MotionSpace& space, const ClipCurves& curves) {
 
 std::vector<SampleMatrix> block_samples(const PreparedSource& clips, const MotionSpace& space, int start, int count) {
   std::vector<SampleMatrix> out(static_cast<std::size_t>(count));
-  tbb::parallel_for(0, count, [&](int i) {
-    out[static_cast<std::size_t>(i)] = clip_samples(space, clips.load(start + i).curves);
-  });
+  tbb::parallel_for(
+      0, count, [&](int i) { out[static_cast<std::size_t>(i)] = clip_samples(space, clips.load(start + i).curves); });
   return out;
 }
 
 template <typename Visit>
-void for_each_block(const PreparedSource& clips, const MotionSpace& space, const Progress& progress, const Visit& visit) {
+void for_each_block(const PreparedSource& clips, const MotionSpace& space, const Progress& progress,
+                    const Visit& visit) {
   for (int start = 0; start < clips.count; start += clips_per_block) {
     progress.check_stop();
     progress.at("index", static_cast<double>(start) / clips.count);
@@ -58,8 +58,8 @@ void ClipSpaceOptions::validate() const {
   }
 }
 
-ClipSpace ClipSpace::build(const PreparedSource& clips, const Eigen::Matrix4Xd& references, const ClipSpaceOptions& options,
-                           const Progress& progress) {
+ClipSpace ClipSpace::build(const PreparedSource& clips, const Eigen::Matrix4Xd& references,
+                           const ClipSpaceOptions& options, const Progress& progress) {
   options.validate();
   if (clips.count == 0) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "one clip or more"});
   MotionSpace space(clips.load(0).skeleton, {.functions = options.functions}, clip_points);
@@ -74,8 +74,7 @@ ClipSpace ClipSpace::build(const PreparedSource& clips, const Eigen::Matrix4Xd& 
       squares += s.colwise().squaredNorm() / static_cast<double>(s.rows());
     }
   });
-  const Eigen::RowVectorXd variance =
-      (squares / clips.count - (sum / clips.count).cwiseAbs2()).cwiseMax(0.0);
+  const Eigen::RowVectorXd variance = (squares / clips.count - (sum / clips.count).cwiseAbs2()).cwiseMax(0.0);
   const double travel = variance.head<3>().sum();
   const double rotation = variance.tail(space.curves() - 3).sum();
   const double scale = travel > 0 && rotation > 0 ? std::sqrt(options.travel_share * rotation / travel) : 1;

@@ -1,9 +1,10 @@
 // One vector for a whole clip: what nearest-motion queries search.
 //
-// The whole clip, its time scaled to [0, 1], is sampled at 64 points: quaternions, and the root's velocity per clip length (so
-// that the same motion played faster is the same curve), scaled such that over the library the velocity has `travel_share` of
-// the variance of the rotations. Functional PCA of these curves gives the space; the vector is all scores, and the distance of
-// two clips is the L2 distance of their curves (yoo2019, eq. 3), or with joint weights eq. 14:
+// The whole clip, its time scaled to [0, 1], is sampled at 64 points: quaternions, and the root's velocity per clip
+// length (so that the same motion played faster is the same curve), scaled such that over the library the velocity has
+// `travel_share` of the variance of the rotations. Functional PCA of these curves gives the space; the vector is all
+// scores, and the distance of two clips is the L2 distance of their curves (yoo2019, eq. 3), or with joint weights eq.
+// 14:
 //
 //   D^2 = sum_c w_c^2 sum_k (x_kc - x'_kc)^2
 #pragma once
@@ -51,11 +52,13 @@ class ClipSpace {
   double travel_scale_;
 };
 
-// Weights of eq. 14, one a curve, mean square 1. Joints count by how far they move what hangs on them (curve_weights), the
-// root's travel as much as an average joint: tang 2008 fitted weights to people's judgement for one skeleton; these need none.
+// Weights of eq. 14, one a curve, mean square 1. Joints count by how far they move what hangs on them (curve_weights),
+// the root's travel as much as an average joint: tang 2008 fitted weights to people's judgement for one skeleton; these
+// need none.
 [[nodiscard]] std::vector<float> distance_weights(const Skeleton& skeleton);
 
 // Squared distance of two vectors of a space with `curves` curves; `weights` empty: plain.
-[[nodiscard]] double squared_distance(std::span<const float> a, std::span<const float> b, std::span<const float> weights);
+[[nodiscard]] double squared_distance(std::span<const float> a, std::span<const float> b,
+                                      std::span<const float> weights);
 
 }  // namespace kinespace

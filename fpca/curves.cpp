@@ -127,7 +127,9 @@ void make_continuous(SampleMatrix& values, Eigen::Index at) {
 
 }  // namespace
 
-CurveLayout curve_layout(const Skeleton& skeleton) { return {skeleton.rotating_joints()}; }
+CurveLayout curve_layout(const Skeleton& skeleton) {
+  return {skeleton.rotating_joints()};
+}
 
 double heading_of(const Eigen::Quaterniond& q) {
   if (std::hypot(q.w(), q.y()) < 1e-9) return 0;
@@ -228,7 +230,8 @@ std::vector<SideTrack> unpack_side_tracks(std::span<const std::byte> bytes, int 
     const bool whole = !track.frames.empty() && track.frames.front() == 0 && track.frames.back() == frames - 1 &&
                        std::ranges::is_sorted(track.frames, std::less_equal<>{});
     if (!whole) in.fail("side track knots out of order", "frames ascending from the first to the last");
-    track.values = in.get_array<double>(static_cast<std::uint64_t>(knots) * static_cast<std::uint64_t>(track.dimensions));
+    track.values =
+        in.get_array<double>(static_cast<std::uint64_t>(knots) * static_cast<std::uint64_t>(track.dimensions));
     if (!std::ranges::all_of(track.values, [](double v) { return std::isfinite(v); })) {
       in.fail("a side track value that is no number", "finite values");
     }

@@ -1,14 +1,15 @@
 // The curves of a clip (yoo2019, section 5.1): the travel of the root and one unit quaternion per rotating joint.
 //
-// The clip is turned about the vertical so that its first frame has heading 0 and starts at the origin; where it stood and
-// looked is kept beside the curves (Placement). What the curves do not carry - joints above the travel root, and
+// The clip is turned about the vertical so that its first frame has heading 0 and starts at the origin; where it stood
+// and looked is kept beside the curves (Placement). What the curves do not carry - joints above the travel root, and
 // translations of other joints - is kept as side tracks, so that the way back gives the whole clip.
 #pragma once
 
-#include <Eigen/Core>
 #include <array>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "base/bytes.h"
 #include "fpca/uniform_spline.h"
@@ -16,7 +17,8 @@
 
 namespace kinespace {
 
-// Which curve is which: 0, 1, 2 the root's travel along X, Y, Z; then w, x, y, z of each rotating joint, the root first.
+// Which curve is which: 0, 1, 2 the root's travel along X, Y, Z; then w, x, y, z of each rotating joint, the root
+// first.
 struct CurveLayout {
   std::vector<int> joints;  // Skeleton::rotating_joints()
 
@@ -36,7 +38,7 @@ struct Placement {
 // A piecewise linear track of something the curves do not carry, in its parent's frame.
 struct SideTrack {
   int joint = 0;
-  int dimensions = 3;  // 3: translation in cm; 4: rotation w x y z
+  int dimensions = 3;          // 3: translation in cm; 4: rotation w x y z
   std::vector<int> frames;     // knots, ascending, first 0 and last frames - 1
   std::vector<double> values;  // [knot][dimension]
 };
@@ -56,8 +58,8 @@ struct ClipCurves {
 // Side tracks keep to these: 1e-4 cm for translations, 1e-7 for quaternions.
 [[nodiscard]] ClipCurves clip_curves(const Clip& clip);
 
-// The way back; quaternions are renormalised. `skeleton` must be that of the clip (or one of the same tree: the motion on
-// other bones).
+// The way back; quaternions are renormalised. `skeleton` must be that of the clip (or one of the same tree: the motion
+// on other bones).
 [[nodiscard]] Clip clip_from_curves(const ClipCurves& curves, const Skeleton& skeleton);
 
 // The heading of an orientation: the angle of its twist about +Y (swing-twist), in (-pi, pi]; 0 where it has none.
@@ -65,7 +67,7 @@ struct ClipCurves {
 
 // Side tracks as bytes for storage, and back (throws Error{bad_input} naming `source`).
 [[nodiscard]] Bytes pack_side_tracks(const std::vector<SideTrack>& tracks);
-[[nodiscard]] std::vector<SideTrack> unpack_side_tracks(std::span<const std::byte> bytes, int frames, const Skeleton& skeleton,
-                                                        const std::string& source);
+[[nodiscard]] std::vector<SideTrack> unpack_side_tracks(std::span<const std::byte> bytes, int frames,
+                                                        const Skeleton& skeleton, const std::string& source);
 
 }  // namespace kinespace

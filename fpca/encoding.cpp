@@ -24,7 +24,8 @@ SampleMatrix integrate_travel(const SampleMatrix& samples, const Warp& warp, dou
   const Eigen::Index points = samples.rows();
   SampleMatrix rate = samples.leftCols(travel_curves);
   const double step = 1.0 / static_cast<double>(points - 1);
-  for (Eigen::Index i = 0; i < points; ++i) rate.row(i) *= warp.slope(static_cast<double>(i) * step) * duration_s * step;
+  for (Eigen::Index i = 0; i < points; ++i)
+    rate.row(i) *= warp.slope(static_cast<double>(i) * step) * duration_s * step;
   return UniformSpline(std::move(rate)).cumulative_integral();
 }
 
@@ -51,8 +52,8 @@ SampleMatrix decode_frames(const MotionSpace& space, const EncodedSequence& sequ
   return out;
 }
 
-// The correction's shape over the distance x (in fractions of the sequence) from the cut: `value` is 1 at the cut with no
-// slope, `slope` is 0 there and rises at once; both vanish smoothly at x = blend.
+// The correction's shape over the distance x (in fractions of the sequence) from the cut: `value` is 1 at the cut with
+// no slope, `slope` is 0 there and rises at once; both vanish smoothly at x = blend.
 struct Fade {
   double value = 0;
   double slope = 0;
@@ -163,7 +164,10 @@ SampleMatrix RunSampler::sample(int first, int last, const Warp& warp, int point
 
 EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
                    const std::vector<Warp>& warps) {
-  EncodedClip out{.name = curves.name, .rate_hz = curves.rate_hz, .frames = curves.frames(), .placement = curves.placement,
+  EncodedClip out{.name = curves.name,
+                  .rate_hz = curves.rate_hz,
+                  .frames = curves.frames(),
+                  .placement = curves.placement,
                   .side_tracks = curves.side_tracks};
   std::size_t warp = 0;
   for (const Run& run : runs) {
@@ -183,8 +187,11 @@ EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std
 }
 
 ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n, const JoinOptions& options) {
-  ClipCurves out{.name = clip.name, .rate_hz = clip.rate_hz, .placement = clip.placement,
-                 .values = SampleMatrix(clip.frames, space.curves()), .side_tracks = clip.side_tracks};
+  ClipCurves out{.name = clip.name,
+                 .rate_hz = clip.rate_hz,
+                 .placement = clip.placement,
+                 .values = SampleMatrix(clip.frames, space.curves()),
+                 .side_tracks = clip.side_tracks};
   for (const EncodedRun& run : clip.runs) {
     std::vector<DecodedSequence> sequences;
     Eigen::Vector3d start = run.start.cast<double>();

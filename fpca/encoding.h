@@ -1,13 +1,14 @@
 // A clip in a motion space: from its curves to the vectors of its sequences, and back at any level of detail.
 //
-// Sequences are independent in the space; on the way back they are joined so that nothing jumps at a cut: neighbours meet at
-// the mean of their two ends, and where the change of slope at the cut is larger than what the sequences show inside, the
-// excess is taken out, both by corrections that fade within `blend` of a sequence.
+// Sequences are independent in the space; on the way back they are joined so that nothing jumps at a cut: neighbours
+// meet at the mean of their two ends, and where the change of slope at the cut is larger than what the sequences show
+// inside, the excess is taken out, both by corrections that fade within `blend` of a sequence.
 #pragma once
 
-#include <Eigen/Core>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "fpca/curves.h"
 #include "fpca/motion_space.h"
@@ -21,8 +22,9 @@ struct EncodedSequence {
   int first = 0;  // frames of the clip, both included
   int last = 0;
   Warp warp;
-  Eigen::Vector3f travel = Eigen::Vector3f::Zero();  // metres from the first to the last frame, heading 0 frame of the clip
-  ScoreMatrix scores;                                // K x C
+  Eigen::Vector3f travel =
+      Eigen::Vector3f::Zero();  // metres from the first to the last frame, heading 0 frame of the clip
+  ScoreMatrix scores;           // K x C
 };
 
 struct EncodedRun {
@@ -62,19 +64,24 @@ class RunSampler {
   double rate_hz_;
 };
 
-// `curves` must be on the space's side (MotionSpace::apply_references). One warp a sequence, in order; none: identities.
+// `curves` must be on the space's side (MotionSpace::apply_references). One warp a sequence, in order; none:
+// identities.
 [[nodiscard]] EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
                                  const std::vector<Warp>& warps = {});
 
 // With the first n functions (all when n < 0).
-[[nodiscard]] ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n = -1, const JoinOptions& join = {});
+[[nodiscard]] ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n = -1,
+                                const JoinOptions& join = {});
 
-// A clip outside the library, into the space: curves, sides, cuts, vectors. Throws Error{bad_input} for another skeleton.
-[[nodiscard]] EncodedClip encode_clip(const MotionSpace& space, const Clip& clip, const SequenceOptions& sequences = {});
+// A clip outside the library, into the space: curves, sides, cuts, vectors. Throws Error{bad_input} for another
+// skeleton.
+[[nodiscard]] EncodedClip encode_clip(const MotionSpace& space, const Clip& clip,
+                                      const SequenceOptions& sequences = {});
 
-// Bounds the root mean square joint position error, in cm, that leaving out all but n functions makes in a sequence, from the
-// scores alone: rms |p~ - p| <= rms root error + sum over the joints above of 2 sqrt(2) rms |q~ - q| times the distance below
-// them that they swing. Joining at cuts is not in it. Largest over joints.
-[[nodiscard]] double truncation_bound_cm(const MotionSpace& space, const Skeleton& skeleton, const EncodedClip& clip, int n);
+// Bounds the root mean square joint position error, in cm, that leaving out all but n functions makes in a sequence,
+// from the scores alone: rms |p~ - p| <= rms root error + sum over the joints above of 2 sqrt(2) rms |q~ - q| times the
+// distance below them that they swing. Joining at cuts is not in it. Largest over joints.
+[[nodiscard]] double truncation_bound_cm(const MotionSpace& space, const Skeleton& skeleton, const EncodedClip& clip,
+                                         int n);
 
 }  // namespace kinespace

@@ -1,13 +1,13 @@
 #include "fpca/library_builder.h"
 
-#include <fmt/format.h>
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cctype>
 #include <map>
 #include <set>
 #include <utility>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "base/error.h"
 #include "base/file.h"
@@ -26,8 +26,8 @@ constexpr int importer_version = 1;  // raise it when imports of the same file w
 // Everything that an import depends on besides its file.
 std::string fingerprint_of(const LibraryBuilderOptions& options) {
   const SequenceOptions& s = options.space.sequences;
-  return fmt::format("importer {} sequences {} {} {} {} {} {}", importer_version, s.shortest_s, s.longest_s, s.length_weight,
-                     s.jerk_weight, s.break_cm, s.break_ratio);
+  return fmt::format("importer {} sequences {} {} {} {} {} {}", importer_version, s.shortest_s, s.longest_s,
+                     s.length_weight, s.jerk_weight, s.break_cm, s.break_ratio);
 }
 
 // One file on its way into the library.
@@ -81,8 +81,10 @@ PreparedSource source_of_imports(const std::vector<const Import*>& imports, cons
             const Import& import = *imports[static_cast<std::size_t>(i)];
             const auto bytes = build.find_import(import.source_hash);
             if (!bytes) {
-              throw Error(ErrorKind::machine, {.file = import.file.string(), .found = "its import is gone",
-                                               .expected = "the partial library to stay", .remedy = "build again"});
+              throw Error(ErrorKind::machine, {.file = import.file.string(),
+                                               .found = "its import is gone",
+                                               .expected = "the partial library to stay",
+                                               .remedy = "build again"});
             }
             PreparedClip clip = unpack_prepared(*bytes, import.file.string());
             clip.curves.name = import.name;
@@ -108,7 +110,8 @@ class SpaceWriter {
  public:
   SpaceWriter(Library& library, const BuiltSpace& built, const ClipSpace& clips, const std::string& tree_hash)
       : library_(library), built_(built), clips_(clips), tree_hash_(tree_hash) {
-    space_id_ = library.put_space({.name = sequence_space_name(tree_hash), .tree_hash = tree_hash, .blob = pack_space(built.space)});
+    space_id_ = library.put_space(
+        {.name = sequence_space_name(tree_hash), .tree_hash = tree_hash, .blob = pack_space(built.space)});
     library.put_space({.name = clip_space_name(tree_hash), .tree_hash = tree_hash, .blob = clips.pack()});
   }
   [[nodiscard]] std::int64_t space_id() const { return space_id_; }
@@ -120,8 +123,10 @@ class SpaceWriter {
       progress.at("encode", static_cast<double>(start) / source.count);
       const int count = std::min(clips_per_block, source.count - start);
       std::vector<Ready> ready(static_cast<std::size_t>(count));
-      tbb::parallel_for(0, count, [&](int i) { ready[static_cast<std::size_t>(i)] = make(source.load(start + i), start + i); });
-      for (int i = 0; i < count; ++i) add(*imports[static_cast<std::size_t>(start + i)], ready[static_cast<std::size_t>(i)], report);
+      tbb::parallel_for(0, count,
+                        [&](int i) { ready[static_cast<std::size_t>(i)] = make(source.load(start + i), start + i); });
+      for (int i = 0; i < count; ++i)
+        add(*imports[static_cast<std::size_t>(start + i)], ready[static_cast<std::size_t>(i)], report);
     }
     progress.at("encode", 1);
   }
@@ -146,9 +151,14 @@ class SpaceWriter {
   void add(const Import& import, const Ready& ready, LibraryReport& report) {
     const std::int64_t skeleton_id = library_.add_skeleton(
         {.name = import.file.filename().string(), .tree_hash = tree_hash_, .blob = pack_skeleton(ready.skeleton)});
-    const ClipRow row{.space_id = space_id_, .skeleton_id = skeleton_id, .name = import.name,
-                      .source = import.file.string(), .source_hash = import.source_hash, .rate_hz = ready.clip.rate_hz,
-                      .frames = ready.clip.frames, .labels = labels_of(import.name)};
+    const ClipRow row{.space_id = space_id_,
+                      .skeleton_id = skeleton_id,
+                      .name = import.name,
+                      .source = import.file.string(),
+                      .source_hash = import.source_hash,
+                      .rate_hz = ready.clip.rate_hz,
+                      .frames = ready.clip.frames,
+                      .labels = labels_of(import.name)};
     store_clip(library_, row, ready.clip, built_.space, ready.retrieval, false);
     const double weight = static_cast<double>(row.frames);
     report.mean_joint_error_cm += weight * ready.clip.error.mean_joint_error_cm;
@@ -173,19 +183,22 @@ void transfer_clips(Library& library, std::int64_t space_id, const MotionSpace& 
     const Skeleton skeleton = unpack_skeleton(library.skeleton(row.skeleton_id).blob, row.name);
     const PackedClip packed{library.clip_blob(row.id, ClipBlob::vectors), library.clip_blob(row.id, ClipBlob::warps),
                             library.clip_blob(row.id, ClipBlob::side)};
-    EncodedClip clip = unpack_clip(packed, from, skeleton,
-                                   {.name = row.name, .rate_hz = row.rate_hz, .frames = static_cast<int>(row.frames)}, row.name);
+    EncodedClip clip =
+        unpack_clip(packed, from, skeleton,
+                    {.name = row.name, .rate_hz = row.rate_hz, .frames = static_cast<int>(row.frames)}, row.name);
     for (EncodedRun& run : clip.runs) {
       for (EncodedSequence& s : run.sequences) s.scores = to.transfer(s.scores, from);
     }
     const std::vector<float> old_vector = library.retrieval_vector(row.id);
-    const Eigen::Map<const ScoreMatrix> old_scores(old_vector.data(), clips_from.space().functions(), clips_from.space().curves());
+    const Eigen::Map<const ScoreMatrix> old_scores(old_vector.data(), clips_from.space().functions(),
+                                                   clips_from.space().curves());
     const ScoreMatrix scores = clips_to.space().transfer(old_scores, clips_from.space());
     store_clip(library, row, clip, to, {scores.data(), scores.data() + scores.size()}, true);
   }
 }
 
-void require_one_tree(const std::map<std::string, std::vector<const Import*>>& by_tree, const LibraryBuilderOptions& options) {
+void require_one_tree(const std::map<std::string, std::vector<const Import*>>& by_tree,
+                      const LibraryBuilderOptions& options) {
   if (options.by_skeleton || by_tree.size() < 2) return;
   const Import& a = *by_tree.begin()->second.front();
   const Import& b = *std::next(by_tree.begin())->second.front();
@@ -196,8 +209,9 @@ void require_one_tree(const std::map<std::string, std::vector<const Import*>>& b
 }
 
 // The spaces of one joint tree: new ones, or the library's own extended by the new clips.
-void build_tree(const std::string& tree_hash, const std::vector<const Import*>& imports, const LibraryBuilderOptions& options,
-                LibraryBuild& build, const Compute& compute, const Progress& progress, LibraryReport& report) {
+void build_tree(const std::string& tree_hash, const std::vector<const Import*>& imports,
+                const LibraryBuilderOptions& options, LibraryBuild& build, const Compute& compute,
+                const Progress& progress, LibraryReport& report) {
   Library& library = build.library();
   const PreparedSource source = source_of_imports(imports, build);
   std::optional<SpaceRow> old_space, old_clips;
@@ -259,18 +273,23 @@ std::vector<std::filesystem::path> find_motion_files(const std::vector<std::file
         if (entry.is_regular_file() && is_motion_file(entry.path())) files.insert(entry.path());
       }
     } else if (!std::filesystem::exists(argument)) {
-      throw Error(ErrorKind::bad_input, {.file = argument.string(), .found = "no such file or folder",
-                                         .expected = "a motion file or a folder of them", .remedy = "check the path"});
+      throw Error(ErrorKind::bad_input, {.file = argument.string(),
+                                         .found = "no such file or folder",
+                                         .expected = "a motion file or a folder of them",
+                                         .remedy = "check the path"});
     } else if (is_motion_file(argument)) {
       files.insert(argument);
     } else {
-      throw Error(ErrorKind::bad_input, {.file = argument.string(), .found = "not a motion file by its ending",
-                                         .expected = ".bvh or .amc", .remedy = "name clips, or folders that hold them"});
+      throw Error(ErrorKind::bad_input, {.file = argument.string(),
+                                         .found = "not a motion file by its ending",
+                                         .expected = ".bvh or .amc",
+                                         .remedy = "name clips, or folders that hold them"});
     }
   }
   if (files.empty()) {
     throw Error(ErrorKind::bad_input, {.file = arguments.empty() ? "" : arguments.front().string(),
-                                       .found = "no motion files", .expected = "at least one .bvh or .amc"});
+                                       .found = "no motion files",
+                                       .expected = "at least one .bvh or .amc"});
   }
   return {files.begin(), files.end()};
 }
@@ -327,7 +346,8 @@ LibraryReport build_library(const std::vector<std::filesystem::path>& files, con
   std::map<std::string, std::vector<const Import*>> by_tree;
   for (const Import& import : imports) by_tree[import.tree_hash].push_back(&import);
   require_one_tree(by_tree, options);
-  for (const auto& [tree_hash, members] : by_tree) build_tree(tree_hash, members, options, build, compute, progress, report);
+  for (const auto& [tree_hash, members] : by_tree)
+    build_tree(tree_hash, members, options, build, compute, progress, report);
   if (report.frames > 0) report.mean_joint_error_cm /= static_cast<double>(report.frames);
   summarise(build.library(), report);
   build.finish();

@@ -1,10 +1,10 @@
 #include "fpca/library_view.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <limits>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "base/error.h"
 #include "fpca/space_codec.h"
@@ -36,8 +36,12 @@ double largest_distance(const JointPositions& a, const JointPositions& b) {
 
 }  // namespace
 
-std::string sequence_space_name(const std::string& tree_hash) { return "sequences " + tree_hash; }
-std::string clip_space_name(const std::string& tree_hash) { return "clips " + tree_hash; }
+std::string sequence_space_name(const std::string& tree_hash) {
+  return "sequences " + tree_hash;
+}
+std::string clip_space_name(const std::string& tree_hash) {
+  return "clips " + tree_hash;
+}
 
 LibraryView::LibraryView(const std::filesystem::path& path) : library_(Library::open_read_only(path)) {}
 
@@ -52,10 +56,12 @@ ClipRow LibraryView::require_clip(const std::string& name) const {
       nearest = row.name;
     }
   }
-  throw Error(ErrorKind::usage, {.file = library_.path().string(),
-                                 .found = fmt::format("no clip \"{}\"", name),
-                                 .remedy = nearest.empty() ? "the library has no clips"
-                                                           : fmt::format("the nearest name is \"{}\"; kinespace info lists all", nearest)});
+  throw Error(
+      ErrorKind::usage,
+      {.file = library_.path().string(),
+       .found = fmt::format("no clip \"{}\"", name),
+       .remedy = nearest.empty() ? "the library has no clips"
+                                 : fmt::format("the nearest name is \"{}\"; kinespace info lists all", nearest)});
 }
 
 const MotionSpace& LibraryView::space(std::int64_t space_id) {
@@ -73,8 +79,10 @@ const ClipSpace& LibraryView::clip_space(std::int64_t space_id) {
     return clip_spaces_.emplace(space_id, ClipSpace::unpack(library_.space(row.id).blob, library_.path().string()))
         .first->second;
   }
-  throw Error(ErrorKind::bad_input, {.file = library_.path().string(), .found = "no index of whole clips",
-                                     .expected = "a space of the name " + wanted, .remedy = "build the library again"});
+  throw Error(ErrorKind::bad_input, {.file = library_.path().string(),
+                                     .found = "no index of whole clips",
+                                     .expected = "a space of the name " + wanted,
+                                     .remedy = "build the library again"});
 }
 
 const Skeleton& LibraryView::skeleton(std::int64_t skeleton_id) {

@@ -1,11 +1,11 @@
 #include "fpca/motion_space.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "base/error.h"
 
@@ -30,7 +30,8 @@ void MotionSpaceOptions::validate() const {
   const auto fail = [](const std::string& found, const char* expected) {
     throw Error(ErrorKind::usage, {.found = found, .expected = expected});
   };
-  if (points != 0 && (points < 4 || points > 1024)) fail(fmt::format("points = {}", points), "0 (automatic) or 4 to 1024");
+  if (points != 0 && (points < 4 || points > 1024))
+    fail(fmt::format("points = {}", points), "0 (automatic) or 4 to 1024");
   if (!(variance_share > 0 && variance_share <= 1)) {
     fail(fmt::format("variance_share = {}", variance_share), "a share above 0, up to 1");
   }
@@ -64,18 +65,24 @@ void MotionSpace::apply_references(SampleMatrix& values) const {
 
 int MotionSpace::group_count() const {
   switch (options_.grouping) {
-    case Grouping::all_together: return 1;
-    case Grouping::per_component: return 7;
-    case Grouping::per_joint_component: return curves();
+    case Grouping::all_together:
+      return 1;
+    case Grouping::per_component:
+      return 7;
+    case Grouping::per_joint_component:
+      return curves();
   }
   return 1;
 }
 
 int MotionSpace::group_of(int curve) const {
   switch (options_.grouping) {
-    case Grouping::all_together: return 0;
-    case Grouping::per_component: return CurveLayout::component(curve);
-    case Grouping::per_joint_component: return curve;
+    case Grouping::all_together:
+      return 0;
+    case Grouping::per_component:
+      return CurveLayout::component(curve);
+    case Grouping::per_joint_component:
+      return curve;
   }
   return 0;
 }

@@ -1,21 +1,22 @@
-// The motion space (yoo2019, sections 4 and 5.3): orthonormal functions of one sequence's time, found by functional PCA over
-// the curves of many sequences, and the vector of a sequence in it.
+// The motion space (yoo2019, sections 4 and 5.3): orthonormal functions of one sequence's time, found by functional PCA
+// over the curves of many sequences, and the vector of a sequence in it.
 //
-// A sequence is sampled at T points over [0, 1] of its (warped) time: C = 3 + 4 J curves, the root's velocity in m/s and the
-// joints' quaternions. Curve c of group g is
+// A sequence is sampled at T points over [0, 1] of its (warped) time: C = 3 + 4 J curves, the root's velocity in m/s
+// and the joints' quaternions. Curve c of group g is
 //
 //   f_c(s) = mu_g(s) + sum_k  x_kc phi_gk(s),      x_kc = integral (f_c - mu_g) phi_gk ds                 (eq. 1, 10)
 //
-// The vector of a sequence is all x_kc, function by function, most important first: its first n rows are the sequence at a
-// coarser level of detail, and by Parseval the L2 error of leaving the rest out is the norm of the rest.
+// The vector of a sequence is all x_kc, function by function, most important first: its first n rows are the sequence
+// at a coarser level of detail, and by Parseval the L2 error of leaving the rest out is the norm of the rest.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "fpca/curve_moments.h"
 #include "fpca/curves.h"
@@ -34,10 +35,10 @@ enum class Grouping : std::uint8_t {
 
 struct MotionSpaceOptions {
   Grouping grouping = Grouping::all_together;
-  int points = 0;                  // T, 4 .. 1024; 0: longest_s times the highest rate, plus 12, at least 48
-  double variance_share = 0.99999;  // of the curves' variance that the functions cover, in (0, 1] ...
-  std::optional<int> functions;    // ... or a count, 1 .. T
-  bool smooth = false;             // smooth mean and covariance and take the noise off (PACE); clean motion needs none
+  int points = 0;                   // T, 4 .. 1024; 0: longest_s times the highest rate, plus 12, at least 48
+  double variance_share = 0.999999;  // of the curves' variance that the functions cover, in (0, 1] ...
+  std::optional<int> functions;     // ... or a count, 1 .. T
+  bool smooth = false;              // smooth mean and covariance and take the noise off (PACE); clean motion needs none
 
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;
@@ -92,7 +93,7 @@ class MotionSpace {
   [[nodiscard]] const MotionSpaceOptions& options() const { return options_; }
   [[nodiscard]] int points() const { return points_; }
   [[nodiscard]] int curves() const { return layout_.curve_count(); }
-  [[nodiscard]] int functions() const;  // of the largest group: the rows of a score matrix
+  [[nodiscard]] int functions() const;       // of the largest group: the rows of a score matrix
   [[nodiscard]] int function_count() const;  // over all groups
   [[nodiscard]] int group_of(int curve) const;
   [[nodiscard]] int group_count() const;

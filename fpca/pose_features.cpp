@@ -1,8 +1,9 @@
 #include "fpca/pose_features.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+
+#include <Eigen/Geometry>
 
 namespace kinespace {
 namespace {
@@ -69,7 +70,8 @@ PoseFeatures pose_features(const ClipCurves& curves, const Skeleton& skeleton, c
     const int after = std::min(i + 1, out.rows - 1);
     for (int k = 1; k < joints; ++k) {
       features.segment<3>(6 * k) = (weight[static_cast<std::size_t>(k)] * (quaternion(keys, i, k) * u)).cast<float>();
-      features.segment<3>(6 * k + 3) = (weight[static_cast<std::size_t>(k)] * (quaternion(keys, after, k) * u)).cast<float>();
+      features.segment<3>(6 * k + 3) =
+          (weight[static_cast<std::size_t>(k)] * (quaternion(keys, after, k) * u)).cast<float>();
     }
   }
   return out;

@@ -1,10 +1,10 @@
 #include "fpca/sequences.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include <fmt/format.h>
 
 #include "base/error.h"
 #include "motion/kinematics.h"
@@ -14,8 +14,7 @@ namespace {
 
 void require(bool legal, const char* field, double value, const char* range) {
   if (legal) return;
-  throw Error(ErrorKind::usage,
-              {.found = fmt::format("SequenceOptions::{} = {}", field, value), .expected = range});
+  throw Error(ErrorKind::usage, {.found = fmt::format("SequenceOptions::{} = {}", field, value), .expected = range});
 }
 
 // What the cuts and the breaks are chosen by, frame by frame.
@@ -108,7 +107,8 @@ struct Lengths {
   int longest;
 };
 
-// The legal lengths as steps between the first and the last of that many frames; widened where no number of legal sequences adds up to n steps.
+// The legal lengths as steps between the first and the last of that many frames; widened where no number of legal
+// sequences adds up to n steps.
 Lengths legal_lengths(int n, double rate_hz, const SequenceOptions& options) {
   constexpr double rounding = 1e-9;  // 0.8 s at 30 Hz are 24 frames, not 25
   const int longest = std::max(1, static_cast<int>(std::floor(options.longest_s * rate_hz + rounding)) - 1);

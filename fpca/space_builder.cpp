@@ -1,12 +1,12 @@
 #include "fpca/space_builder.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
-
-#include <Eigen/Eigenvalues>
-#include <algorithm>
-#include <cmath>
 
 #include "base/error.h"
 #include "fpca/pose_features.h"
@@ -16,8 +16,8 @@ namespace {
 
 constexpr int clips_per_block = 16;  // fixed, so that sums do not depend on threads
 
-// Loads every clip once, block by block and the clips of a block in parallel, and hands each to `work` (in parallel) and then
-// to `gather` (one at a time, in order).
+// Loads every clip once, block by block and the clips of a block in parallel, and hands each to `work` (in parallel)
+// and then to `gather` (one at a time, in order).
 template <typename Result>
 void for_each_clip(const PreparedSource& clips, const Progress& progress, std::string_view stage,
                    const std::function<Result(int, const PreparedClip&)>& work,
@@ -44,10 +44,13 @@ struct Survey {
   std::vector<int> lengths;  // frames of each sequence less one
 };
 
-int automatic_points(int longest_sequence) { return std::max(48, longest_sequence + 12); }
+int automatic_points(int longest_sequence) {
+  return std::max(48, longest_sequence + 12);
+}
 
 // Samples of all sequences of a clip under its warps.
-std::vector<SampleMatrix> clip_samples(const MotionSpace& space, const PreparedClip& clip, const std::vector<Warp>& warps) {
+std::vector<SampleMatrix> clip_samples(const MotionSpace& space, const PreparedClip& clip,
+                                       const std::vector<Warp>& warps) {
   SampleMatrix values = clip.curves.values;
   space.apply_references(values);
   std::vector<SampleMatrix> out;
@@ -73,7 +76,8 @@ std::vector<CurveMoments> gather_moments(const PreparedSource& clips, const Moti
       clips, progress, stage,
       [&](int i, const PreparedClip& clip) {
         std::vector<CurveMoments> part = space.empty_moments();
-        const auto samples = clip_samples(space, clip, warps.empty() ? std::vector<Warp>() : warps[static_cast<std::size_t>(i)]);
+        const auto samples =
+            clip_samples(space, clip, warps.empty() ? std::vector<Warp>() : warps[static_cast<std::size_t>(i)]);
         space.accumulate(samples, part);
         return part;
       },
@@ -118,8 +122,10 @@ SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace&
         }
         for (const Run& run : clip.runs) {
           for (int i = 0; i < run.sequence_count(); ++i) {
-            const int from = std::min(static_cast<int>(std::lround(run.first_frame(i) * keys_per_frame)), features.rows - 1);
-            const int to = std::clamp(static_cast<int>(std::lround(run.last_frame(i) * keys_per_frame)), from, features.rows - 1);
+            const int from =
+                std::min(static_cast<int>(std::lround(run.first_frame(i) * keys_per_frame)), features.rows - 1);
+            const int to =
+                std::clamp(static_cast<int>(std::lround(run.last_frame(i) * keys_per_frame)), from, features.rows - 1);
             part.features.emplace_back(features.values.begin() + static_cast<std::ptrdiff_t>(from) * features.dims,
                                        features.values.begin() + static_cast<std::ptrdiff_t>(to + 1) * features.dims);
           }
@@ -137,7 +143,8 @@ SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace&
         }
       });
   table.vectors.resize(static_cast<Eigen::Index>(vectors.size()), vectors.empty() ? 0 : vectors.front().size());
-  for (std::size_t i = 0; i < vectors.size(); ++i) table.vectors.row(static_cast<Eigen::Index>(i)) = vectors[i].transpose();
+  for (std::size_t i = 0; i < vectors.size(); ++i)
+    table.vectors.row(static_cast<Eigen::Index>(i)) = vectors[i].transpose();
   return table;
 }
 
@@ -155,7 +162,8 @@ std::vector<std::vector<Warp>> propose_warps(const PreparedSource& clips, const 
     pairs.push_back({groups.templates[static_cast<std::size_t>(groups.group[i])], static_cast<int>(i)});
   }
   progress.check_stop();
-  const auto matches = dtw(table.features, table.features, pairs, {.steps = StepPattern::slope_limited, .want_path = true}, compute);
+  const auto matches =
+      dtw(table.features, table.features, pairs, {.steps = StepPattern::slope_limited, .want_path = true}, compute);
   for (std::size_t i = 0; i < matches.size(); ++i) {
     auto& warps = out[static_cast<std::size_t>(table.entries[i].clip)];
     const auto& t = table.entries[static_cast<std::size_t>(pairs[i].query)];
@@ -187,7 +195,9 @@ Survey survey(const PreparedSource& clips, const Progress& progress) {
       clips, progress, "survey",
       [](int, const PreparedClip& clip) {
         Survey one{.orientations = OrientationMoments(curve_layout(clip.skeleton).joint_count()),
-                   .skeleton = clip.skeleton, .name = clip.curves.name, .rate_hz = clip.curves.rate_hz};
+                   .skeleton = clip.skeleton,
+                   .name = clip.curves.name,
+                   .rate_hz = clip.curves.rate_hz};
         one.orientations.add(clip.curves.values);
         for (const Run& run : clip.runs) {
           for (int i = 0; i < run.sequence_count(); ++i) one.lengths.push_back(run.last_frame(i) - run.first_frame(i));
@@ -233,7 +243,8 @@ BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& opt
   options.validate();
   if (clips.count == 0) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "one clip or more"});
   const Survey found = survey(clips, progress);
-  const int points = options.space.points != 0 ? options.space.points : std::min(1024, automatic_points(found.lengths.front()));
+  const int points =
+      options.space.points != 0 ? options.space.points : std::min(1024, automatic_points(found.lengths.front()));
   const Eigen::Matrix4Xd references = found.orientations.references();
 
   MotionSpace space(found.skeleton, options.space, points);
@@ -256,7 +267,8 @@ BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& opt
           },
           [&](int i, std::vector<Warp>& w) { next[static_cast<std::size_t>(i)] = std::move(w); });
       warps = std::move(next);
-      if (round + 1 < options.alignment.rounds) pooled.fit(gather_moments(clips, pooled, warps, progress, "analyse"), compute);
+      if (round + 1 < options.alignment.rounds)
+        pooled.fit(gather_moments(clips, pooled, warps, progress, "analyse"), compute);
     }
   }
   space.fit(gather_moments(clips, space, warps, progress, "analyse"), compute);
@@ -268,7 +280,8 @@ BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips, c
                         const Compute& compute, const Progress& progress) {
   options.validate();
   std::vector<std::vector<Warp>> warps(static_cast<std::size_t>(clips.count));
-  // Functions of all curves together are what warps are searched against; spaces of other groupings take clips as they are.
+  // Functions of all curves together are what warps are searched against; spaces of other groupings take clips as they
+  // are.
   if (options.align && options.alignment.rounds > 0 && space.options().grouping == Grouping::all_together) {
     const WarpSearch search(space, options.alignment);
     for_each_clip<std::vector<Warp>>(

@@ -1,7 +1,7 @@
 // From clips to a motion space: cut, align, analyse.
 //
-// Clips are read one at a time from a source, as often as there are rounds, so memory does not grow with their number beyond
-// what the source keeps: moments (T x T), a few numbers a sequence, and the clip in hand.
+// Clips are read one at a time from a source, as often as there are rounds, so memory does not grow with their number
+// beyond what the source keeps: moments (T x T), a few numbers a sequence, and the clip in hand.
 #pragma once
 
 #include <functional>
@@ -47,15 +47,17 @@ struct BuiltSpace {
   std::vector<std::vector<Warp>> warps;  // for each clip, one a sequence
 };
 
-// All clips must have the tree of the first; throws Error{bad_input} naming the two that differ, and Error{usage} for no
-// clips. The result does not depend on threads.
+// All clips must have the tree of the first; throws Error{bad_input} naming the two that differ, and Error{usage} for
+// no clips. The result does not depend on threads.
 [[nodiscard]] BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& options,
                                      const Compute& compute = {}, const Progress& progress = {});
 
-// The space with more clips in it: the moments of the new clips (aligned to the functions that are there) are merged into
-// the space's own, exactly, and the functions found anew. Grid, references, grouping and options stay those of `space`.
-[[nodiscard]] BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips, const SpaceBuildOptions& options,
-                                      const Compute& compute = {}, const Progress& progress = {});
+// The space with more clips in it: the moments of the new clips (aligned to the functions that are there) are merged
+// into the space's own, exactly, and the functions found anew. Grid, references, grouping and options stay those of
+// `space`.
+[[nodiscard]] BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips,
+                                      const SpaceBuildOptions& options, const Compute& compute = {},
+                                      const Progress& progress = {});
 
 // The main axis of sum q q' for each joint (markley 2007), canonical sign: largest entry positive. 4 x J.
 class OrientationMoments {
@@ -70,6 +72,7 @@ class OrientationMoments {
 };
 
 // Warps of one clip against a space, without templates: how clips outside the library are aligned.
-[[nodiscard]] std::vector<Warp> align_clip(const WarpSearch& search, const ClipCurves& curves, const std::vector<Run>& runs);
+[[nodiscard]] std::vector<Warp> align_clip(const WarpSearch& search, const ClipCurves& curves,
+                                           const std::vector<Run>& runs);
 
 }  // namespace kinespace

@@ -1,10 +1,10 @@
 #include "fpca/space_codec.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "base/error.h"
 #include "fpca/space_builder.h"
@@ -18,7 +18,9 @@ namespace {
 constexpr std::int64_t most_joints = 4096;
 constexpr std::int64_t most_points = 1024;
 
-void put_vector3(ByteWriter& out, const Eigen::Vector3d& v) { out.put_array(std::span<const double>(v.data(), 3)); }
+void put_vector3(ByteWriter& out, const Eigen::Vector3d& v) {
+  out.put_array(std::span<const double>(v.data(), 3));
+}
 
 Eigen::Vector3d get_vector3(ByteReader& in) {
   Eigen::Vector3d v;
@@ -53,7 +55,8 @@ Bytes group_section(const FunctionGroup& group, const CurveMoments& moments) {
   return std::move(out).take();
 }
 
-std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> bytes, int points, const std::string& source) {
+std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> bytes, int points,
+                                                   const std::string& source) {
   ByteReader in(bytes, source);
   const std::uint64_t functions = get_varint(in);
   if (functions > static_cast<std::uint64_t>(points)) {
@@ -72,7 +75,9 @@ std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> by
   return {std::move(group), CurveMoments(count, mean, scatter)};
 }
 
-std::string group_name(std::size_t i) { return fmt::format("group {}", i); }
+std::string group_name(std::size_t i) {
+  return fmt::format("group {}", i);
+}
 
 // One function's scores of all sequences of a clip, in steps, as whole floats: their low bytes are zero and pack well.
 Bytes score_block(const std::vector<const EncodedSequence*>& sequences, Eigen::Index function) {
@@ -115,18 +120,22 @@ void unpack_sequences(ByteReader in, EncodedClip& clip) {
     EncodedRun& run = clip.runs.emplace_back();
     const std::size_t count = get_count(in, 1 + Warp::terms, "sequences");
     const std::uint64_t first = get_varint(in);
-    if (count == 0 || first != static_cast<std::uint64_t>(next)) in.fail("a run out of place", "runs that follow each other");
+    if (count == 0 || first != static_cast<std::uint64_t>(next))
+      in.fail("a run out of place", "runs that follow each other");
     std::int64_t at = next;
     for (std::size_t i = 0; i < count; ++i) {
       const std::uint64_t length = get_varint(in);
-      if (length > static_cast<std::uint64_t>(clip.frames)) in.fail("a sequence beyond the clip's end", "frames of the clip");
+      if (length > static_cast<std::uint64_t>(clip.frames))
+        in.fail("a sequence beyond the clip's end", "frames of the clip");
       Warp::Coefficients coefficients{};
       for (std::int8_t& a : coefficients) a = in.get<std::int8_t>();
       if (!Warp::legal(coefficients)) in.fail("a time warp that is not monotone", "slopes within [1/2, 2]");
-      EncodedSequence s{.first = static_cast<int>(at), .last = static_cast<int>(at + static_cast<std::int64_t>(length)),
+      EncodedSequence s{.first = static_cast<int>(at),
+                        .last = static_cast<int>(at + static_cast<std::int64_t>(length)),
                         .warp = Warp(coefficients)};
       at = s.last;
-      if (at >= clip.frames || (length == 0 && count > 1)) in.fail("a sequence beyond the clip's end", "frames of the clip");
+      if (at >= clip.frames || (length == 0 && count > 1))
+        in.fail("a sequence beyond the clip's end", "frames of the clip");
       run.sequences.push_back(std::move(s));
     }
     next = at + 1;
@@ -285,10 +294,12 @@ EncodedClip unpack_clip(const PackedClip& packed, const MotionSpace& space, cons
   clip.error = vectors.error();
   auto blocks = vectors.blocks("scores");
   if (blocks.size() > static_cast<std::size_t>(space.functions())) {
-    throw Error(ErrorKind::bad_input, {.file = source, .found = fmt::format("{} functions", blocks.size()),
+    throw Error(ErrorKind::bad_input, {.file = source,
+                                       .found = fmt::format("{} functions", blocks.size()),
                                        .expected = fmt::format("{}, as the space has", space.functions())});
   }
-  if (functions >= 0 && static_cast<std::size_t>(functions) < blocks.size()) blocks.resize(static_cast<std::size_t>(functions));
+  if (functions >= 0 && static_cast<std::size_t>(functions) < blocks.size())
+    blocks.resize(static_cast<std::size_t>(functions));
   const auto curves = static_cast<std::size_t>(space.curves());
   const auto count = static_cast<std::size_t>(clip.sequence_count());
   for (EncodedRun& run : clip.runs) {
@@ -354,14 +365,14 @@ PreparedClip unpack_prepared(std::span<const std::byte> bytes, const std::string
     if (cuts == 0) in.fail("a run without frames", "one frame or more");
   }
   out.skeleton = unpack_skeleton(in.take(get_count(in, 1, "bytes")), source);
-  out.curves.side_tracks = unpack_side_tracks(in.take(get_count(in, 1, "bytes")), static_cast<int>(frames), out.skeleton, source);
+  out.curves.side_tracks =
+      unpack_side_tracks(in.take(get_count(in, 1, "bytes")), static_cast<int>(frames), out.skeleton, source);
   const int curves = curve_layout(out.skeleton).curve_count();
   const auto values = in.get_array<float>(frames * static_cast<std::uint64_t>(curves));
   in.expect_end();
-  out.curves.values =
-      Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-          values.data(), static_cast<Eigen::Index>(frames), curves)
-          .cast<double>();
+  out.curves.values = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
+                          values.data(), static_cast<Eigen::Index>(frames), curves)
+                          .cast<double>();
   return out;
 }
 

@@ -1,9 +1,9 @@
-// Motion spaces, encoded clips and clips made ready as bytes: bitstreams (storage/bitstream.h) with checksums, versions and
-// every size checked before it is believed. All of it throws Error{bad_input} naming `source`.
+// Motion spaces, encoded clips and clips made ready as bytes: bitstreams (storage/bitstream.h) with checksums, versions
+// and every size checked before it is believed. All of it throws Error{bad_input} naming `source`.
 //
-// The vectors of a clip are stored function by function, the most important first, each function a block of its own with its
-// own checksum: any prefix is a valid, coarser clip. Scores are kept in steps of `score_step`: half a step is the largest error
-// of a score, 5e-5 of a quaternion's length, which is 0.005 cm at the end of an arm.
+// The vectors of a clip are stored function by function, the most important first, each function a block of its own
+// with its own checksum: any prefix is a valid, coarser clip. Scores are kept in steps of `score_step`: half a step is
+// the largest error of a score, 5e-5 of a quaternion's length, which is 0.005 cm at the end of an arm.
 #pragma once
 
 #include <memory>
@@ -30,7 +30,8 @@ struct PackedClip {
   Bytes side;     // where the clip stands, what each sequence travels, side tracks
 };
 [[nodiscard]] PackedClip pack_clip(const EncodedClip& clip, const MotionSpace& space);
-// With at most `functions` functions (all when < 0), of a stream that may end early. `header` gives name, rate and frames.
+// With at most `functions` functions (all when < 0), of a stream that may end early. `header` gives name, rate and
+// frames.
 [[nodiscard]] EncodedClip unpack_clip(const PackedClip& packed, const MotionSpace& space, const Skeleton& skeleton,
                                       const EncodedClip& header, const std::string& source, int functions = -1);
 

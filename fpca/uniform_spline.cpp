@@ -9,9 +9,9 @@
 namespace kinespace {
 namespace {
 
-// Second derivatives of the not-a-knot spline. Inside, M_{i-1} + 4 M_i + M_{i+1} = 6 (y_{i-1} - 2 y_i + y_{i+1}); the third
-// derivative is continuous at the second and the last but one sample, so M_0 = 2 M_1 - M_2 and likewise at the end, which
-// leaves 6 M_1 = 6 (...) in the first and last equation of the tridiagonal system.
+// Second derivatives of the not-a-knot spline. Inside, M_{i-1} + 4 M_i + M_{i+1} = 6 (y_{i-1} - 2 y_i + y_{i+1}); the
+// third derivative is continuous at the second and the last but one sample, so M_0 = 2 M_1 - M_2 and likewise at the
+// end, which leaves 6 M_1 = 6 (...) in the first and last equation of the tridiagonal system.
 SampleMatrix second_derivatives(const SampleMatrix& y) {
   const Eigen::Index n = y.rows();
   SampleMatrix m = SampleMatrix::Zero(n, y.cols());

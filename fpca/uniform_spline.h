@@ -1,8 +1,8 @@
 // Interpolating cubic splines over a uniform grid, many curves at once.
 //
 // Samples stand in rows, curves in columns (row-major: one sample of all curves is contiguous), so that solving and
-// evaluating run along the curves. Through y_0 .. y_{n-1} at x = 0, 1, .., n-1 the spline is the C2 piecewise cubic with
-// "not-a-knot" ends; with three samples it is the parabola, with two the line, with one the constant.
+// evaluating run along the curves. Through y_0 .. y_{n-1} at x = 0, 1, .., n-1 the spline is the C2 piecewise cubic
+// with "not-a-knot" ends; with three samples it is the parabola, with two the line, with one the constant.
 //
 //   on [i, i+1], b = x - i, a = 1 - b:   a y_i + b y_{i+1} + ((a^3 - a) M_i + (b^3 - b) M_{i+1}) / 6
 //

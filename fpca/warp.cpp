@@ -1,9 +1,10 @@
 #include "fpca/warp.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
+#include <Eigen/Dense>
 
 #include "base/error.h"
 
@@ -38,7 +39,8 @@ CosineTable cosine_table() {
 
 Warp::Warp(const Coefficients& coefficients) : coefficients_(coefficients) {
   if (!legal(coefficients)) {
-    throw Error(ErrorKind::bad_input, {.found = "a time warp with a slope outside [1/2, 2]", .expected = "a legal warp"});
+    throw Error(ErrorKind::bad_input,
+                {.found = "a time warp with a slope outside [1/2, 2]", .expected = "a legal warp"});
   }
 }
 
@@ -81,7 +83,9 @@ double Warp::own_time(double s) const {
   return sum;
 }
 
-double Warp::slope(double s) const { return slope_of(coefficients_, s); }
+double Warp::slope(double s) const {
+  return slope_of(coefficients_, s);
+}
 
 double Warp::space_time(double u) const {
   if (u <= 0) return 0;

@@ -2,9 +2,9 @@
 //
 //   h(s) = s + sum_k a_k sin(k pi s) / (k pi),      h'(s) = 1 + sum_k a_k cos(k pi s),      k = 1 .. 5
 //
-// Smooth to every order, so that a warped curve needs no more functions than it has to (the bends of a piecewise warp would
-// show in the higher ones), and it fixes both ends. The a_k are kept in steps of 1/64: a warp is five bytes. Its slope stays
-// within [1/2, 2] (yoo2019, section 5.2, has no limits; sakoe 1978 has these).
+// Smooth to every order, so that a warped curve needs no more functions than it has to (the bends of a piecewise warp
+// would show in the higher ones), and it fixes both ends. The a_k are kept in steps of 1/64: a warp is five bytes. Its
+// slope stays within [1/2, 2] (yoo2019, section 5.2, has no limits; sakoe 1978 has these).
 #pragma once
 
 #include <array>
@@ -23,7 +23,8 @@ class Warp {
   // Throws Error{bad_input} when the slope leaves [1/2, 2].
   explicit Warp(const Coefficients& coefficients);
   [[nodiscard]] static bool legal(const Coefficients& coefficients);
-  // The warp through the given own times at space times k / (terms + 1), as far towards it from the identity as is legal.
+  // The warp through the given own times at space times k / (terms + 1), as far towards it from the identity as is
+  // legal.
   [[nodiscard]] static Warp through(const std::array<double, terms>& own_times);
 
   [[nodiscard]] const Coefficients& coefficients() const { return coefficients_; }

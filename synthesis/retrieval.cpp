@@ -1,10 +1,10 @@
 #include "synthesis/retrieval.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include <fmt/format.h>
 
 #include "base/error.h"
 #include "fpca/pose_features.h"
@@ -20,9 +20,8 @@ struct Candidate {
 };
 
 bool has_labels(const ClipRow& row, const std::vector<std::string>& wanted) {
-  return std::ranges::all_of(wanted, [&](const std::string& label) {
-    return std::ranges::find(row.labels, label) != row.labels.end();
-  });
+  return std::ranges::all_of(
+      wanted, [&](const std::string& label) { return std::ranges::find(row.labels, label) != row.labels.end(); });
 }
 
 // The `keep` nearest vectors, nearest first, of clips that may be matches.
@@ -101,8 +100,12 @@ std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curve
   for (const Candidate& candidate : found) {
     const auto row = std::ranges::lower_bound(rows, candidate.clip_id, {}, &ClipRow::id);
     const double distance = std::sqrt(candidate.squared);
-    out.push_back({.clip = row->name, .distance = options.rerank ? candidate.cost : distance, .vector_distance = distance,
-                   .start_s = 0, .end_s = static_cast<double>(row->frames - 1) / row->rate_hz, .labels = row->labels});
+    out.push_back({.clip = row->name,
+                   .distance = options.rerank ? candidate.cost : distance,
+                   .vector_distance = distance,
+                   .start_s = 0,
+                   .end_s = static_cast<double>(row->frames - 1) / row->rate_hz,
+                   .labels = row->labels});
   }
   return out;
 }

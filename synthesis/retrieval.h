@@ -1,8 +1,10 @@
-// The motions nearest to a clip: yoo2019's distance in the space of whole clips, and the best of these again by time warping.
+// The motions nearest to a clip: yoo2019's distance in the space of whole clips, and the best of these again by time
+// warping.
 //
-// The vectors are searched by the exact L2 distance of all dimensions (eq. 3, or eq. 14 with joint weights); the `candidates`
-// best are then compared by DTW of their keyframes (eq. 12; a slanted band of 10 % of the length, cost divided by the sum of
-// both lengths, since a sum alone favours short clips) and ordered by that. Ties go to the clip that was added first.
+// The vectors are searched by the exact L2 distance of all dimensions (eq. 3, or eq. 14 with joint weights); the
+// `candidates` best are then compared by DTW of their keyframes (eq. 12; a slanted band of 10 % of the length, cost
+// divided by the sum of both lengths, since a sum alone favours short clips) and ordered by that. Ties go to the clip
+// that was added first.
 #pragma once
 
 #include <string>
@@ -34,13 +36,14 @@ struct Match {
   std::vector<std::string> labels;
 };
 
-// The clips of the library nearest to `clip`, nearest first; `except` (a clip's name) is left out. No clips of that joint
-// tree: no matches. The clip may be of any frame rate and of other bone lengths.
-[[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const Clip& clip, const QueryOptions& options = {},
-                                                 const std::string& except = {}, const Compute& compute = {});
-// The same for curves of a skeleton, as LibraryView::curves gives them.
-[[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
+// The clips of the library nearest to `clip`, nearest first; `except` (a clip's name) is left out. No clips of that
+// joint tree: no matches. The clip may be of any frame rate and of other bone lengths.
+[[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const Clip& clip,
                                                  const QueryOptions& options = {}, const std::string& except = {},
                                                  const Compute& compute = {});
+// The same for curves of a skeleton, as LibraryView::curves gives them.
+[[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curves,
+                                                 const Skeleton& skeleton, const QueryOptions& options = {},
+                                                 const std::string& except = {}, const Compute& compute = {});
 
 }  // namespace kinespace

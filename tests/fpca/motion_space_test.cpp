@@ -1,0 +1,219 @@
+#include "fpca/motion_space.h"
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
+
+#include "base/error.h"
+#include "fpca/space_codec.h"
+#include "motion/error_measures.h"
+#include "motion/kinematics.h"
+#include "tests/fpca/sample_space.h"
+
+namespace kinespace {
+namespace {
+
+using test::encode_sample;
+using test::prepared_samples;
+using test::sample_clips;
+using test::sample_space;
+
+Clip decode_sample(const BuiltSpace& built, std::size_t i, int n) {
+  return clip_from_curves(decode(built.space, encode_sample(built, i), n), sample_clips()[i].skeleton);
+}
+
+TEST(MotionSpace, functions_are_orthonormal_in_the_inner_product_of_the_scores) {
+  const FunctionGroup& group = sample_space().space.groups().front();
+  const Eigen::VectorXd w = trapezoid_weights(sample_space().space.points(), 1.0);
+  const Eigen::MatrixXd gram = group.functions.transpose() * w.asDiagonal() * group.functions;
+  EXPECT_LT((gram - Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST(MotionSpace, all_functions_give_every_clip_back) {
+  for (std::size_t i = 0; i < sample_clips().size(); ++i) {
+    const MotionError error = compare(sample_clips()[i], decode_sample(sample_space(), i, -1));
+    EXPECT_LT(error.mean_joint_error_cm, 0.1) << sample_clips()[i].name;
+    EXPECT_LT(error.max_joint_error_cm, 5) << sample_clips()[i].name;
+  }
+}
+
+TEST(MotionSpace, more_functions_leave_less_error) {
+  double before = 1e9;
+  for (const int n : {0, 1, 3, 5, 8, 12}) {
+    double sum = 0;
+    for (std::size_t i = 0; i < 6; ++i)
+      sum += compare(sample_clips()[i], decode_sample(sample_space(), i, n)).mean_joint_error_cm;
+    EXPECT_LT(sum, before) << n;
+    before = sum;
+  }
+}
+
+TEST(MotionSpace, a_clip_ends_where_it_ended_at_any_level_of_detail) {
+  for (const int n : {1, 5}) {
+    const Clip decoded = decode_sample(sample_space(), 0, n);
+    const int last = decoded.frames - 1;
+    EXPECT_LT((decoded.translation(0, last) - sample_clips()[0].translation(0, last)).norm(), 1e-2);
+  }
+}
+
+TEST(MotionSpace, the_error_of_leaving_functions_out_is_known_from_the_scores) {
+  const MotionSpace& space = sample_space().space;
+  const EncodedClip clip = encode_sample(sample_space(), 1);
+  const ScoreMatrix& scores = clip.runs[0].sequences[0].scores;
+  const SampleMatrix difference = space.samples(scores) - space.samples(scores, 4);
+  const Eigen::VectorXd w = trapezoid_weights(space.points(), 1.0);
+  const Eigen::VectorXd measured = (difference.cwiseAbs2().transpose() * w).cwiseSqrt();
+  EXPECT_LT((measured - space.truncation_error(scores, 4)).cwiseAbs().maxCoeff(), 1e-6);
+}
+
+TEST(MotionSpace, the_error_bound_holds) {
+  const MotionSpace& space = sample_space().space;
+  for (std::size_t i = 0; i < sample_clips().size(); ++i) {
+    const EncodedClip clip = encode_sample(sample_space(), i);
+    const JointPositions all = joint_positions(clip_from_curves(decode(space, clip), sample_clips()[i].skeleton));
+    for (const int n : {4, 8}) {
+      const JointPositions some = joint_positions(clip_from_curves(decode(space, clip, n), sample_clips()[i].skeleton));
+      double squares = 0;
+      for (std::size_t p = 0; p < all.values.size(); ++p) squares += (all.values[p] - some.values[p]).squaredNorm();
+      EXPECT_LE(std::sqrt(squares / static_cast<double>(all.values.size())),
+                truncation_bound_cm(space, sample_clips()[i].skeleton, clip, n))
+          << sample_clips()[i].name;
+    }
+  }
+}
+
+TEST(MotionSpace, building_from_two_halves_and_merging_equals_building_from_all) {
+  const MotionSpace& space = sample_space().space;
+  std::vector<SampleMatrix> samples;
+  for (const PreparedClip& clip : prepared_samples()) {
+    SampleMatrix values = clip.curves.values;
+    space.apply_references(values);
+    const RunSampler sampler(values, clip.runs[0], clip.curves.rate_hz);
+    samples.push_back(sampler.sample(clip.runs[0].first_frame(0), clip.runs[0].last_frame(0), Warp(), space.points()));
+  }
+  auto all = space.empty_moments();
+  space.accumulate(samples, all);
+  auto first = space.empty_moments();
+  auto second = space.empty_moments();
+  const std::size_t half = samples.size() / 2;
+  space.accumulate(std::span(samples).first(half), first);
+  space.accumulate(std::span(samples).subspan(half), second);
+  first[0].merge(second[0]);
+  EXPECT_LT((first[0].mean() - all[0].mean()).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LT((first[0].scatter() - all[0].scatter()).norm(), 1e-10 * all[0].scatter().norm());
+}
+
+TEST(MotionSpace, every_grouping_gives_clips_back) {
+  for (const Grouping grouping : {Grouping::per_component, Grouping::per_joint_component}) {
+    SpaceBuildOptions options;
+    options.space.grouping = grouping;
+    const BuiltSpace built = build_space(source_of(prepared_samples()), options);
+    EXPECT_GT(built.space.function_count(), sample_space().space.function_count());
+    EXPECT_LT(compare(sample_clips()[2], decode_sample(built, 2, -1)).mean_joint_error_cm, 0.2);
+  }
+}
+
+TEST(MotionSpace, the_result_does_not_depend_on_threads) {
+  const oneapi::tbb::global_control one(oneapi::tbb::global_control::max_allowed_parallelism, 1);
+  const BuiltSpace alone = build_space(source_of(prepared_samples()), {});
+  EXPECT_EQ(pack_space(alone.space), pack_space(sample_space().space));
+}
+
+TEST(MotionSpace, clips_of_two_trees_are_refused_with_both_names) {
+  std::vector<PreparedClip> clips{prepared_samples()[0], prepared_samples()[1]};
+  clips[1].skeleton.joints.back().name = "another";
+  try {
+    static_cast<void>(build_space(source_of(clips), {}));
+    FAIL() << "not refused";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+    EXPECT_NE(std::string(error.what()).find(clips[0].curves.name), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find(clips[1].curves.name), std::string::npos);
+  }
+}
+
+TEST(MotionSpace, other_bone_lengths_are_fine) {
+  std::vector<PreparedClip> clips{prepared_samples()[0], prepared_samples()[1]};
+  for (Joint& joint : clips[1].skeleton.joints) joint.offset *= 1.1;
+  EXPECT_NO_THROW(static_cast<void>(build_space(source_of(clips), {})));
+}
+
+TEST(MotionSpace, short_and_constant_clips_can_be_encoded) {
+  std::vector<PreparedClip> clips = prepared_samples();
+  for (const int frames : {1, 2, 3}) clips.push_back(prepare(slice(sample_clips()[0], 0, frames)));
+  clips.push_back(prepare(make_clip("rest", sample_clips()[0].skeleton, 60, 200)));
+  const BuiltSpace built = build_space(source_of(clips), {});
+  for (std::size_t i = prepared_samples().size(); i < clips.size(); ++i) {
+    ClipCurves curves = clips[i].curves;
+    built.space.apply_references(curves.values);
+    const ClipCurves decoded = decode(built.space, encode(built.space, curves, clips[i].runs, built.warps[i]));
+    EXPECT_LT((decoded.values - curves.values).cwiseAbs().maxCoeff(), 0.01) << i;
+  }
+}
+
+TEST(MotionSpace, alignment_lowers_what_the_first_functions_leave) {
+  SpaceBuildOptions options;
+  options.align = false;
+  const BuiltSpace plain = build_space(source_of(prepared_samples()), options);
+  const auto left = [](const MotionSpace& space, int n) {
+    const FunctionGroup& g = space.groups().front();
+    return g.variance - g.eigenvalues.head(n).sum();
+  };
+  EXPECT_LT(left(sample_space().space, 10), left(plain.space, 10));
+}
+
+TEST(SpaceCodec, a_space_comes_back_bit_for_bit) {
+  const Bytes bytes = pack_space(sample_space().space);
+  const MotionSpace back = unpack_space(bytes, "test");
+  EXPECT_EQ(pack_space(back), bytes);
+}
+
+TEST(SpaceCodec, a_clip_comes_back_within_half_a_step_of_each_score) {
+  const EncodedClip clip = encode_sample(sample_space(), 0);
+  const PackedClip packed = pack_clip(clip, sample_space().space);
+  const EncodedClip back = unpack_clip(packed, sample_space().space, sample_clips()[0].skeleton, clip, "test");
+  ASSERT_EQ(back.sequence_count(), clip.sequence_count());
+  for (std::size_t i = 0; i < clip.runs[0].sequences.size(); ++i) {
+    const auto& a = clip.runs[0].sequences[i];
+    const auto& b = back.runs[0].sequences[i];
+    EXPECT_EQ(a.warp.coefficients(), b.warp.coefficients());
+    EXPECT_LT((a.scores - b.scores).cwiseAbs().maxCoeff(), 0.51 * score_step);
+  }
+}
+
+TEST(SpaceCodec, a_stream_that_was_cut_is_a_coarser_clip) {
+  const EncodedClip clip = encode_sample(sample_space(), 0);
+  PackedClip packed = pack_clip(clip, sample_space().space);
+  const Bytes whole = packed.vectors;
+  int coarser = 0;
+  for (std::size_t n = 0; n < whole.size(); n += 37) {
+    packed.vectors.assign(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(n));
+    try {
+      const EncodedClip back = unpack_clip(packed, sample_space().space, sample_clips()[0].skeleton, clip, "test");
+      EXPECT_EQ(back.frames, clip.frames);
+      ++coarser;
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+    }
+  }
+  EXPECT_GT(coarser, 10);
+}
+
+TEST(SpaceCodec, flipped_bytes_are_errors_or_valid_clips) {
+  const EncodedClip clip = encode_sample(sample_space(), 0);
+  const PackedClip packed = pack_clip(clip, sample_space().space);
+  for (Bytes PackedClip::*part : {&PackedClip::vectors, &PackedClip::warps, &PackedClip::side}) {
+    for (std::size_t i = 0; i < (packed.*part).size(); i += 11) {
+      PackedClip damaged = packed;
+      (damaged.*part)[i] ^= std::byte{0x41};
+      try {
+        EXPECT_EQ(unpack_clip(damaged, sample_space().space, sample_clips()[0].skeleton, clip, "test").frames,
+                  clip.frames);
+      } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace kinespace

@@ -1,0 +1,127 @@
+#include "synthesis/retrieval.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "tests/synthesis/library_folder.h"
+
+namespace kinespace {
+namespace {
+
+// The clip played `speed` times as fast, at its own rate.
+Clip at_speed(const Clip& clip, double speed) {
+  const int frames = static_cast<int>(std::lround((clip.frames - 1) / speed)) + 1;
+  Clip out = make_clip(clip.name, clip.skeleton, clip.rate_hz, frames);
+  auto& track = out.require_translation_track(0).values;
+  for (int f = 0; f < frames; ++f) {
+    const double x = std::min<double>(f * speed, clip.frames - 1);
+    const int i = std::min(static_cast<int>(x), clip.frames - 2);
+    const double b = x - i;
+    track[static_cast<std::size_t>(f)] = (1 - b) * clip.translation(0, i) + b * clip.translation(0, i + 1);
+    for (int j = 0; j < clip.skeleton.joint_count(); ++j) {
+      out.set_rotation(j, f, clip.rotation(j, i).slerp(b, clip.rotation(j, i + 1)));
+    }
+  }
+  return out;
+}
+
+class Retrieval : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<test::LibraryFolder>();
+    static_cast<void>(folder_->build());
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+  static std::unique_ptr<test::LibraryFolder> folder_;
+};
+std::unique_ptr<test::LibraryFolder> Retrieval::folder_;
+
+TEST_F(Retrieval, a_clip_from_its_file_finds_itself) {
+  LibraryView view(folder_->library());
+  for (const ClipRow& row : view.library().clips()) {
+    const auto matches = nearest_motions(view, read_clip(row.source), {.k = 1});
+    ASSERT_EQ(matches.size(), 1U);
+    EXPECT_EQ(matches[0].clip, row.name);
+  }
+}
+
+TEST_F(Retrieval, a_slower_and_a_faster_copy_find_the_original) {
+  LibraryView view(folder_->library());
+  for (const ClipRow& row : view.library().clips()) {
+    for (const double speed : {0.8, 1.25}) {
+      for (const bool rerank : {true, false}) {
+        const auto matches = nearest_motions(view, at_speed(read_clip(row.source), speed), {.k = 1, .rerank = rerank});
+        ASSERT_EQ(matches.size(), 1U);
+        EXPECT_EQ(matches[0].clip, row.name) << "at " << speed;
+      }
+    }
+  }
+}
+
+TEST_F(Retrieval, the_list_of_vectors_equals_brute_force) {
+  LibraryView view(folder_->library());
+  const ClipRow query = view.library().clips().front();
+  const auto matches = nearest_motions(view, view.curves(query), view.skeleton(query.skeleton_id),
+                                       {.k = 5, .rerank = false}, query.name);
+  const auto wanted = view.clip_space(query.space_id).vector_of(view.curves(query));
+  std::vector<std::pair<double, std::string>> all;
+  for (const ClipRow& row : view.library().clips()) {
+    if (row.id == query.id) continue;
+    all.emplace_back(squared_distance(wanted, view.library().retrieval_vector(row.id), {}), row.name);
+  }
+  std::ranges::sort(all);
+  ASSERT_EQ(matches.size(), 5U);
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_EQ(matches[i].clip, all[i].second);
+    EXPECT_NEAR(matches[i].distance * matches[i].distance, all[i].first, 1e-9 + 1e-6 * all[i].first);
+  }
+}
+
+TEST_F(Retrieval, labels_and_the_query_itself_are_left_out) {
+  LibraryView view(folder_->library());
+  const ClipRow query = view.library().clips().front();
+  const auto matches = nearest_motions(view, view.curves(query), view.skeleton(query.skeleton_id),
+                                       {.k = 100, .labels = {query.labels.front()}}, query.name);
+  EXPECT_FALSE(matches.empty());
+  for (const Match& match : matches) {
+    EXPECT_NE(match.clip, query.name);
+    EXPECT_EQ(match.labels.front(), query.labels.front());
+  }
+}
+
+TEST_F(Retrieval, weights_change_distances_and_keep_the_nearest) {
+  LibraryView view(folder_->library());
+  const ClipRow row = view.library().clips().front();
+  const auto matches = nearest_motions(view, read_clip(row.source), {.k = 1, .rerank = false, .weighted = true});
+  EXPECT_EQ(matches.at(0).clip, row.name);
+}
+
+TEST_F(Retrieval, another_skeleton_has_no_matches) {
+  LibraryView view(folder_->library());
+  Clip stranger = make_clip("stranger", sample_skeleton(), 30, 40);
+  stranger.skeleton.joints.back().name = "other";
+  EXPECT_TRUE(nearest_motions(view, stranger).empty());
+}
+
+TEST_F(Retrieval, a_wrong_name_brings_the_nearest_one) {
+  const LibraryView view(folder_->library());
+  const std::string name = view.library().clips().front().name;
+  try {
+    static_cast<void>(view.require_clip(name + "x"));
+    FAIL() << "found";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::usage);
+    EXPECT_NE(std::string(error.what()).find('"' + name + '"'), std::string::npos);
+  }
+}
+
+TEST(QueryOptions, out_of_range_is_refused) {
+  EXPECT_THROW(QueryOptions{.k = 0}.validate(), Error);
+  EXPECT_THROW(QueryOptions{.band = 0}.validate(), Error);
+}
+
+}  // namespace
+}  // namespace kinespace
