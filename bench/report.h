@@ -54,6 +54,7 @@ struct Bench {
 [[nodiscard]] BenchReport bench_dtw(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_fpca(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_io(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_kernels(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_retrieval(const BenchOptions& options);
 
 }  // namespace kinespace

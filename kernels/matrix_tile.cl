@@ -1,8 +1,9 @@
 // The product of two matrices in tiles, for kernels that differ in where the factors come from and what becomes of the
 // sums. Who includes this defines the type Operands and
 //   float a_value(Operands o, int i, int k)     row i of the first factor; i within the matrix
-//   float b_value(Operands o, int k, int j)     column j of the second; j up to the next multiple of TILE_COLUMNS
-//   float16 b_values(Operands o, int k, int j)  columns j .. j + 15
+//   float4 a_values(Operands o, int i, int k)   rows i .. i + 3, where A_ROWS_APART is 0: rows lie side by side in
+//   memory float b_value(Operands o, int k, int j)     column j of the second; j up to the next multiple of
+//   TILE_COLUMNS float16 b_values(Operands o, int k, int j)  columns j .. j + 15
 // Build option: WITH_LANES 1 for processors (one item a group; a tile of sums in float16 registers), 0 for GPUs (256
 // items a group, 4 x 4 sums each, factors staged in local memory).
 
@@ -25,19 +26,19 @@ inline void tile_product(Operands o, int first_row, int rows, int first_column, 
     const float16 b0 = b_values(o, k, first_column);
     const float16 b1 = b_values(o, k, first_column + 16);
 #if A_ROWS_APART
-    float a_of[TILE_ROWS];
-#pragma unroll
-    for (int r = 0; r < TILE_ROWS; ++r) a_of[r] = a_value(o, row[r], k);
+    const float4 a =
+        (float4)(a_value(o, row[0], k), a_value(o, row[1], k), a_value(o, row[2], k), a_value(o, row[3], k));
 #else
-    float a_of[TILE_ROWS];
-    vstore4(a_values(o, first_row, k), 0, a_of);
+    const float4 a = a_values(o, first_row, k);
 #endif
-#pragma unroll
-    for (int r = 0; r < TILE_ROWS; ++r) {
-      const float16 a = a_of[r];
-      sums[r][0] = fma(a, b0, sums[r][0]);
-      sums[r][1] = fma(a, b1, sums[r][1]);
-    }
+    sums[0][0] = fma(a.s0, b0, sums[0][0]);
+    sums[0][1] = fma(a.s0, b1, sums[0][1]);
+    sums[1][0] = fma(a.s1, b0, sums[1][0]);
+    sums[1][1] = fma(a.s1, b1, sums[1][1]);
+    sums[2][0] = fma(a.s2, b0, sums[2][0]);
+    sums[2][1] = fma(a.s2, b1, sums[2][1]);
+    sums[3][0] = fma(a.s3, b0, sums[3][0]);
+    sums[3][1] = fma(a.s3, b1, sums[3][1]);
   }
 }
 
