@@ -22,6 +22,7 @@ void remember(int signal) {
 }  // namespace
 
 void catch_stop_signals() {
+  ::signal(SIGXFSZ, SIG_IGN);  // a limit on file sizes is then an error like a full disk
   struct sigaction action {};
   action.sa_handler = remember;
   action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);

@@ -163,7 +163,7 @@ SampleMatrix RunSampler::sample(int first, int last, const Warp& warp, int point
 }
 
 EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
-                   const std::vector<Warp>& warps) {
+                   const std::vector<Warp>& warps, const Compute& compute) {
   EncodedClip out{.name = curves.name,
                   .rate_hz = curves.rate_hz,
                   .frames = curves.frames(),
@@ -179,7 +179,8 @@ EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std
       if (!warps.empty()) sequence.warp = warps.at(warp++);
       sequence.travel =
           (curves.values.row(sequence.last) - curves.values.row(sequence.first)).head<3>().transpose().cast<float>();
-      sequence.scores = space.scores(sampler.sample(sequence.first, sequence.last, sequence.warp, space.points()));
+      sequence.scores =
+          space.scores(sampler.sample(sequence.first, sequence.last, sequence.warp, space.points()), compute);
       encoded.sequences.push_back(std::move(sequence));
     }
   }

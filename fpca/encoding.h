@@ -67,7 +67,7 @@ class RunSampler {
 // `curves` must be on the space's side (MotionSpace::apply_references). One warp a sequence, in order; none:
 // identities.
 [[nodiscard]] EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
-                                 const std::vector<Warp>& warps = {});
+                                 const std::vector<Warp>& warps = {}, const Compute& compute = {});
 
 // With the first n functions (all when n < 0).
 [[nodiscard]] ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n = -1,

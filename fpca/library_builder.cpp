@@ -108,8 +108,9 @@ MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, 
 // What a space does with the clips of one joint tree.
 class SpaceWriter {
  public:
-  SpaceWriter(Library& library, const BuiltSpace& built, const ClipSpace& clips, const std::string& tree_hash)
-      : library_(library), built_(built), clips_(clips), tree_hash_(tree_hash) {
+  SpaceWriter(Library& library, const BuiltSpace& built, const ClipSpace& clips, const std::string& tree_hash,
+              const Compute& compute)
+      : library_(library), built_(built), clips_(clips), tree_hash_(tree_hash), compute_(compute) {
     space_id_ = library.put_space(
         {.name = sequence_space_name(tree_hash), .tree_hash = tree_hash, .blob = pack_space(built.space)});
     library.put_space({.name = clip_space_name(tree_hash), .tree_hash = tree_hash, .blob = clips.pack()});
@@ -141,7 +142,8 @@ class SpaceWriter {
   [[nodiscard]] Ready make(PreparedClip prepared, int index) const {
     Ready out;
     built_.space.apply_references(prepared.curves.values);
-    out.clip = encode(built_.space, prepared.curves, prepared.runs, built_.warps[static_cast<std::size_t>(index)]);
+    out.clip =
+        encode(built_.space, prepared.curves, prepared.runs, built_.warps[static_cast<std::size_t>(index)], compute_);
     out.clip.error = measure_error(prepared, built_.space, out.clip);
     out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
@@ -172,6 +174,7 @@ class SpaceWriter {
   const BuiltSpace& built_;
   const ClipSpace& clips_;
   std::string tree_hash_;
+  const Compute& compute_;
   std::int64_t space_id_ = 0;
 };
 
@@ -225,13 +228,13 @@ void build_tree(const std::string& tree_hash, const std::vector<const Import*>& 
     const ClipSpace clips_from = ClipSpace::unpack(old_clips->blob, name);
     const BuiltSpace built = extend_space(from, source, options.space, compute, progress);
     const ClipSpace clips = clips_from.extend(source, progress);
-    SpaceWriter writer(library, built, clips, tree_hash);
+    SpaceWriter writer(library, built, clips, tree_hash, compute);
     transfer_clips(library, writer.space_id(), from, built.space, clips_from, clips);
     writer.write(imports, source, report, progress);
   } else {
     const BuiltSpace built = build_space(source, options.space, compute, progress);
     const ClipSpace clips = ClipSpace::build(source, built.space.references(), options.clips, progress);
-    SpaceWriter(library, built, clips, tree_hash).write(imports, source, report, progress);
+    SpaceWriter(library, built, clips, tree_hash, compute).write(imports, source, report, progress);
   }
 }
 

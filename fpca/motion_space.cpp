@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "kernels/covariance.h"
+#include "kernels/projection.h"
 
 namespace kinespace {
 namespace {
@@ -22,6 +24,18 @@ FpcaOptions fpca_options(const MotionSpaceOptions& options) {
     out.estimate_noise = true;
   }
   return out;
+}
+
+// On the device when it is one for blocks of this size, else in double here.
+void add_block(const CurveMatrix& block, const Compute& compute, CurveMoments& moments) {
+  const double flops = static_cast<double>(block.rows()) * static_cast<double>(block.cols() * block.cols());
+  if (compute.device_for(KernelFamily::covariance, flops) == nullptr) {
+    moments.add(block);
+    return;
+  }
+  const RowMatrix<float> curves = block.cast<float>();
+  const CurveCovariance c = covariance(curves, 0, BlockPrecision::single_precision, compute);
+  moments.merge(CurveMoments(c.count, c.mean, c.covariance * static_cast<double>(c.count)));
 }
 
 }  // namespace
@@ -91,7 +105,8 @@ std::vector<CurveMoments> MotionSpace::empty_moments() const {
   return std::vector<CurveMoments>(static_cast<std::size_t>(group_count()), CurveMoments(points_));
 }
 
-void MotionSpace::accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments) const {
+void MotionSpace::accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments,
+                             const Compute& compute) const {
   assert(moments.size() == static_cast<std::size_t>(group_count()));
   std::vector<int> members;
   for (int g = 0; g < group_count(); ++g) {
@@ -104,12 +119,11 @@ void MotionSpace::accumulate(std::span<const SampleMatrix> samples, std::vector<
     for (const SampleMatrix& s : samples) {
       for (const int c : members) block.row(row++) = s.col(c).transpose();
     }
-    moments[static_cast<std::size_t>(g)].add(block);
+    add_block(block, compute, moments[static_cast<std::size_t>(g)]);
   }
 }
 
-void MotionSpace::fit(std::vector<CurveMoments> moments, const Compute& compute) {
-  static_cast<void>(compute);
+void MotionSpace::fit(std::vector<CurveMoments> moments) {
   groups_.clear();
   FunctionalPcaWorkspace workspace(points_, fpca_options(options_));
   for (const CurveMoments& m : moments) {
@@ -124,12 +138,18 @@ void MotionSpace::fit(std::vector<CurveMoments> moments, const Compute& compute)
   moments_ = std::move(moments);
 }
 
-ScoreMatrix MotionSpace::scores(const SampleMatrix& samples) const {
+ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& compute) const {
   assert(samples.rows() == points_ && samples.cols() == curves());
   ScoreMatrix out = ScoreMatrix::Zero(functions(), curves());
   if (groups_.size() == 1) {
     const FunctionGroup& g = groups_.front();
     const Eigen::MatrixXd projector = (g.functions.array().colwise() * weights_.array()).matrix();
+    const double flops = 2.0 * static_cast<double>(projector.size()) * curves();
+    if (compute.device_for(KernelFamily::projection, flops) != nullptr) {
+      const RowMatrix<float> rows = samples.transpose().cast<float>();
+      const RowMatrix<float> matrix = projector.cast<float>();
+      return project(rows, g.mean.cast<float>(), matrix, compute).transpose();
+    }
     const SampleMatrix centred = samples.colwise() - g.mean;
     out = (projector.transpose() * centred).cast<float>();
     return out;

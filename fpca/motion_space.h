@@ -35,10 +35,10 @@ enum class Grouping : std::uint8_t {
 
 struct MotionSpaceOptions {
   Grouping grouping = Grouping::all_together;
-  int points = 0;                   // T, 4 .. 1024; 0: longest_s times the highest rate, plus 12, at least 48
+  int points = 0;                    // T, 4 .. 1024; 0: longest_s times the highest rate, plus 12, at least 48
   double variance_share = 0.999999;  // of the curves' variance that the functions cover, in (0, 1] ...
-  std::optional<int> functions;     // ... or a count, 1 .. T
-  bool smooth = false;              // smooth mean and covariance and take the noise off (PACE); clean motion needs none
+  std::optional<int> functions;      // ... or a count, 1 .. T
+  bool smooth = false;  // smooth mean and covariance and take the noise off (PACE); clean motion needs none
 
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;
@@ -74,13 +74,15 @@ class MotionSpace {
 
   // One accumulator for each group, to be filled by accumulate.
   [[nodiscard]] std::vector<CurveMoments> empty_moments() const;
-  // Adds the curves of sequences: `samples` are T x C blocks.
-  void accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments) const;
+  // Adds the curves of sequences: `samples` are T x C blocks. An OpenCL device works in float: 1e-6 of the largest
+  // entry.
+  void accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments,
+                  const Compute& compute = {}) const;
   // Finds the functions. The moments stay with the space, so that it can be extended.
-  void fit(std::vector<CurveMoments> moments, const Compute& compute = {});
+  void fit(std::vector<CurveMoments> moments);
 
   // T x C samples to K x C scores and back, with the first n functions (all when n < 0 or too large).
-  [[nodiscard]] ScoreMatrix scores(const SampleMatrix& samples) const;
+  [[nodiscard]] ScoreMatrix scores(const SampleMatrix& samples, const Compute& compute = {}) const;
   [[nodiscard]] SampleMatrix samples(const ScoreMatrix& scores, int n = -1) const;
   // Scores in this space of what the scores were in another one of the same grid and curves (after it was extended).
   [[nodiscard]] ScoreMatrix transfer(const ScoreMatrix& scores, const MotionSpace& from) const;

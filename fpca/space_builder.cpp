@@ -69,8 +69,8 @@ void merge_into(std::vector<CurveMoments>& all, const std::vector<CurveMoments>&
 }
 
 std::vector<CurveMoments> gather_moments(const PreparedSource& clips, const MotionSpace& space,
-                                         const std::vector<std::vector<Warp>>& warps, const Progress& progress,
-                                         std::string_view stage) {
+                                         const std::vector<std::vector<Warp>>& warps, const Compute& compute,
+                                         const Progress& progress, std::string_view stage) {
   std::vector<CurveMoments> all = space.empty_moments();
   for_each_clip<std::vector<CurveMoments>>(
       clips, progress, stage,
@@ -78,7 +78,7 @@ std::vector<CurveMoments> gather_moments(const PreparedSource& clips, const Moti
         std::vector<CurveMoments> part = space.empty_moments();
         const auto samples =
             clip_samples(space, clip, warps.empty() ? std::vector<Warp>() : warps[static_cast<std::size_t>(i)]);
-        space.accumulate(samples, part);
+        space.accumulate(samples, part, compute);
         return part;
       },
       [&](int, std::vector<CurveMoments>& part) { merge_into(all, part); });
@@ -254,7 +254,7 @@ BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& opt
     // Aligned for the functions that all curves share, whatever the grouping of the result.
     MotionSpace pooled(found.skeleton, {.functions = 2 * options.alignment.functions}, points);
     pooled.set_references(references);
-    pooled.fit(gather_moments(clips, pooled, {}, progress, "analyse"), compute);
+    pooled.fit(gather_moments(clips, pooled, {}, compute, progress, "analyse"));
     const auto proposals = propose_warps(clips, pooled, options.alignment, compute, progress);
     for (int round = 0; round < options.alignment.rounds; ++round) {
       const WarpSearch search(pooled, options.alignment);
@@ -268,10 +268,10 @@ BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& opt
           [&](int i, std::vector<Warp>& w) { next[static_cast<std::size_t>(i)] = std::move(w); });
       warps = std::move(next);
       if (round + 1 < options.alignment.rounds)
-        pooled.fit(gather_moments(clips, pooled, warps, progress, "analyse"), compute);
+        pooled.fit(gather_moments(clips, pooled, warps, compute, progress, "analyse"));
     }
   }
-  space.fit(gather_moments(clips, space, warps, progress, "analyse"), compute);
+  space.fit(gather_moments(clips, space, warps, compute, progress, "analyse"));
   if (warps.empty()) warps.resize(static_cast<std::size_t>(clips.count));
   return {std::move(space), std::move(warps)};
 }
@@ -290,10 +290,10 @@ BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips, c
         [&](int i, std::vector<Warp>& w) { warps[static_cast<std::size_t>(i)] = std::move(w); });
   }
   std::vector<CurveMoments> moments = space.moments();
-  merge_into(moments, gather_moments(clips, space, warps, progress, "analyse"));
+  merge_into(moments, gather_moments(clips, space, warps, compute, progress, "analyse"));
   MotionSpace extended(space.skeleton(), space.options(), space.points());
   extended.set_references(space.references());
-  extended.fit(std::move(moments), compute);
+  extended.fit(std::move(moments));
   return {std::move(extended), std::move(warps)};
 }
 

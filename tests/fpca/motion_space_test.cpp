@@ -8,6 +8,7 @@
 #include "motion/error_measures.h"
 #include "motion/kinematics.h"
 #include "tests/fpca/sample_space.h"
+#include "tests/support/data.h"
 
 namespace kinespace {
 namespace {
@@ -159,6 +160,28 @@ TEST(MotionSpace, alignment_lowers_what_the_first_functions_leave) {
     return g.variance - g.eigenvalues.head(n).sum();
   };
   EXPECT_LT(left(sample_space().space, 10), left(plain.space, 10));
+}
+
+TEST(MotionSpace, an_opencl_device_finds_the_same_functions_and_scores) {
+  if (list_devices().empty()) {
+    if (test::data_required()) FAIL() << "no OpenCL device";
+    GTEST_SKIP() << "no OpenCL device on this machine";
+  }
+  const Compute device = Compute::open("opencl");
+  SpaceBuildOptions options;
+  options.align = false;
+  options.space.functions = 8;
+  const BuiltSpace here = build_space(source_of(prepared_samples()), options);
+  const BuiltSpace there = build_space(source_of(prepared_samples()), options, device);
+  const auto& a = here.space.groups().front();
+  const auto& b = there.space.groups().front();
+  EXPECT_LT((a.functions - b.functions).cwiseAbs().maxCoeff(), 1e-3);
+  EXPECT_LT((a.eigenvalues - b.eigenvalues).cwiseAbs().maxCoeff(), 1e-5 * a.eigenvalues(0));
+  ClipCurves curves = prepared_samples()[0].curves;
+  here.space.apply_references(curves.values);
+  const EncodedClip cpu = encode(here.space, curves, prepared_samples()[0].runs);
+  const EncodedClip gpu = encode(here.space, curves, prepared_samples()[0].runs, {}, device);
+  EXPECT_LT((cpu.runs[0].sequences[0].scores - gpu.runs[0].sequences[0].scores).cwiseAbs().maxCoeff(), 1e-4);
 }
 
 TEST(SpaceCodec, a_space_comes_back_bit_for_bit) {

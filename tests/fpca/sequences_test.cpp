@@ -1,8 +1,8 @@
 #include "fpca/sequences.h"
 
-#include <gtest/gtest.h>
-
 #include <array>
+
+#include <gtest/gtest.h>
 
 #include "base/error.h"
 #include "fpca/warp.h"
