@@ -24,7 +24,9 @@ std::optional<std::filesystem::path> golden_folder() {
   return existing("KINESPACE_GOLDEN", std::filesystem::path(KINESPACE_SOURCE_DIR) / "../shared/golden/fpca");
 }
 
-bool data_required() { return std::getenv("CI") != nullptr; }
+bool data_required() {
+  return std::getenv("CI") != nullptr;
+}
 
 TemporaryFolder::TemporaryFolder() {
   std::string name = (std::filesystem::temp_directory_path() / "kinespace-test-XXXXXX").string();
