@@ -18,7 +18,7 @@ ARROWS = {
     "kernels": "base",
     "fpca": "base motion storage kernels",
     "synthesis": "base motion storage kernels fpca",
-    "examples": "base motion",
+    "examples": "base motion storage kernels fpca synthesis",
     "bench": "base motion storage kernels fpca synthesis",
     "cli": "base motion storage kernels fpca synthesis bench",
     "tests": "base motion storage kernels fpca synthesis examples bench cli",
