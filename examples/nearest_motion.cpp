@@ -17,21 +17,20 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    using namespace kinespace;
     const std::filesystem::path folder = argv[1];
     const std::filesystem::path file = std::filesystem::temp_directory_path() / "nearest-motion.kspace";
-    const LibraryReport report = build_library(find_motion_files({folder}), file, {});
+    const kinespace::LibraryReport report = kinespace::build_library(kinespace::find_motion_files({folder}), file, {});
     std::printf("%d clips, %d sequences, %d functions, %.3f cm mean error\n", report.clips, report.sequences,
                 report.functions, report.mean_joint_error_cm);
 
-    LibraryView library(file);
-    for (const Match& match : nearest_motions(library, read_clip(argv[2]), {.k = 5})) {
+    kinespace::LibraryView library(file);
+    for (const kinespace::Match& match : kinespace::nearest_motions(library, kinespace::read_clip(argv[2]), {.k = 5})) {
       std::printf("%8.4f  %s\n", match.distance, match.clip.c_str());
     }
 
-    const ClipRow first = library.library().clips().front();
-    const Clip coarse = library.clip(first, 5);  // the first five functions
-    write_clip("coarse.bvh", coarse);
+    const kinespace::ClipRow first = library.library().clips().front();
+    const kinespace::Clip coarse = library.clip(first, 5);  // the first five functions
+    kinespace::write_clip("coarse.bvh", coarse);
     return 0;
   } catch (const kinespace::Error& error) {
     std::fprintf(stderr, "nearest-motion: %s\n", error.what());

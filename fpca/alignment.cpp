@@ -38,7 +38,7 @@ WarpSearch::WarpSearch(const MotionSpace& space, const AlignmentOptions& options
       curve_weight_(curve_weights(space.skeleton()).cast<float>()) {
   options_.validate();
   const FunctionGroup& group = space.groups().front();
-  const Eigen::Index n = std::min<Eigen::Index>(2 * options_.functions, group.functions.cols());
+  const Eigen::Index n = std::min<Eigen::Index>(2L * options_.functions, group.functions.cols());
   coarse_ = std::min<Eigen::Index>(options_.functions, n);
   SampleMatrix columns(space.points(), n + 1);
   columns << group.mean, group.functions.leftCols(n);

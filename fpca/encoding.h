@@ -71,7 +71,7 @@ class RunSampler {
 
 // With the first n functions (all when n < 0).
 [[nodiscard]] ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n = -1,
-                                const JoinOptions& join = {});
+                                const JoinOptions& options = {});
 
 // A clip outside the library, into the space: curves, sides, cuts, vectors. Throws Error{bad_input} for another
 // skeleton.

@@ -29,10 +29,9 @@ Eigen::Vector3d get_vector3(ByteReader& in) {
   return v;
 }
 
-template <typename Matrix>
-void put_matrix(ByteWriter& out, const Matrix& m) {
-  const Eigen::MatrixXd dense = m;  // column by column
-  out.put_array(std::span<const double>(dense.data(), static_cast<std::size_t>(dense.size())));
+// Column by column.
+void put_matrix(ByteWriter& out, const Eigen::MatrixXd& m) {
+  out.put_array(std::span<const double>(m.data(), static_cast<std::size_t>(m.size())));
 }
 
 Eigen::MatrixXd get_matrix(ByteReader& in, Eigen::Index rows, Eigen::Index cols) {

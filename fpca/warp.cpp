@@ -62,7 +62,8 @@ Warp Warp::through(const std::array<double, terms>& own_times) {
     offset(i) = own_times[static_cast<std::size_t>(i)] - s;
   }
   const Eigen::Vector<double, terms> a = system.partialPivLu().solve(offset);
-  for (double part = 1; part > 0.05; part -= 0.1) {
+  for (int tenths = 10; tenths > 0; --tenths) {
+    const double part = tenths / 10.0;
     Coefficients coefficients{};
     for (int k = 0; k < terms; ++k) {
       coefficients[static_cast<std::size_t>(k)] =
