@@ -89,11 +89,9 @@ std::vector<CurveMoments> gather_moments(const PreparedSource& clips, const Moti
 struct SequenceTable {
   struct Entry {
     int clip;
-    int rows_start;  // keyframes within the clip's features
     int rows;
   };
   std::vector<Entry> entries;
-  std::vector<int> first_of_clip;
   Eigen::MatrixXf vectors;
   FeatureSet features;  // keyframes of each sequence
 };
@@ -133,11 +131,10 @@ SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace&
         return part;
       },
       [&](int i, Part& part) {
-        table.first_of_clip.push_back(static_cast<int>(table.entries.size()));
         table.features.dims = part.dims;
         for (std::size_t s = 0; s < part.vectors.size(); ++s) {
           const int rows = static_cast<int>(part.features[s].size()) / part.dims;
-          table.entries.push_back({i, 0, rows});
+          table.entries.push_back({i, rows});
           table.features.add(part.features[s]);
           vectors.push_back(std::move(part.vectors[s]));
         }
