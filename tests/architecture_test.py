@@ -17,11 +17,13 @@ ARROWS = {
     "storage": "base",
     "kernels": "base",
     "fpca": "base motion storage kernels",
+    "footskate": "base motion storage",
     "synthesis": "base motion storage kernels fpca",
-    "examples": "base motion storage kernels fpca synthesis",
-    "bench": "base motion storage kernels fpca synthesis",
-    "cli": "base motion storage kernels fpca synthesis bench",
-    "tests": "base motion storage kernels fpca synthesis examples bench cli",
+    "codecs": "base motion storage kernels fpca",
+    "examples": "base motion storage kernels fpca footskate synthesis codecs",
+    "bench": "base motion storage kernels fpca footskate synthesis codecs examples",
+    "cli": "base motion storage kernels fpca footskate synthesis codecs bench",
+    "tests": "base motion storage kernels fpca footskate synthesis codecs examples bench cli",
 }
 ARROWS = {folder: set(others.split()) | {folder} for folder, others in ARROWS.items()}
 
