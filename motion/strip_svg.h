@@ -1,0 +1,32 @@
+// Pictures as SVG text: lines, circles, rectangles and labels. Private to this folder.
+//
+// Coordinates are pixels, x to the right, y down, written with two decimals, so that equal pictures are equal texts.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <Eigen/Core>
+
+namespace kinespace {
+
+// With at most two decimals.
+[[nodiscard]] std::string svg_number(double value);
+
+class Svg {
+ public:
+  using Point = Eigen::Vector2d;
+
+  Svg(double width, double height);  // white
+  void line(const Point& a, const Point& b, std::string_view colour, double width);
+  void circle(const Point& middle, double radius, std::string_view fill, std::string_view stroke, double width);
+  void rectangle(const Point& corner, const Point& size, std::string_view fill);
+  // `anchor`: start, middle or end. What XML cannot hold (control characters, bytes that are not UTF-8) becomes '?'.
+  void label(const Point& at, std::string_view words, std::string_view anchor, double size, std::string_view colour);
+  [[nodiscard]] std::string finish() &&;
+
+ private:
+  std::string text_;
+};
+
+}  // namespace kinespace
