@@ -253,7 +253,7 @@ class Strip {
       const int first = std::max(band.first_frame, options_.first_frame);
       const int last = std::min(band.last_frame, last_);
       if (first > last) continue;
-      const auto [low, high] = std::minmax(frame_px(first), frame_px(last));
+      const auto [low, high] = std::minmax({frame_px(first), frame_px(last)});
       const double top = margin_px + header_px - 8;
       svg.rectangle({low, top}, {high - low, floor_px_ - top}, "#fdf0c4");
       svg.label({(low + high) / 2, top + 11}, band.label, "middle", 11, "#8a6d00");

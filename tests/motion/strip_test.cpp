@@ -76,6 +76,13 @@ TEST(Strip, draws_the_ghost_in_grey_behind) {
   EXPECT_LT(with.find("#bdbdbd"), with.find("#d1495b"));
 }
 
+TEST(Strip, puts_a_band_over_its_frames) {
+  const std::string svg = strip_svg(two_legs(0), {.figures = 3, .width_px = 648, .bands = {{15, 45, "seam"}}});
+  // Figures at 0, 1 and 2 s stand at 124, 324 and 524 pixels: the band reaches from 224 to 424.
+  EXPECT_THAT(svg, ::testing::ContainsRegex("<rect x=\"224\" y=\"[0-9.]+\" width=\"200\""));
+  EXPECT_THAT(svg, HasSubstr(">seam<"));
+}
+
 TEST(Strip, keeps_the_picture_well_formed_whatever_the_title_holds) {
   const std::string svg = strip_svg(two_legs(0), {.title = "a<b>&\"\x01\xff\xc3\xa4"});
   EXPECT_THAT(svg, HasSubstr(">a&lt;b&gt;&amp;&quot;??\xc3\xa4<"));
