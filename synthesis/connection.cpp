@@ -1,0 +1,444 @@
+#include "synthesis/connection.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/QR>
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "fpca/alignment.h"
+
+namespace kinespace {
+namespace {
+
+constexpr int fine_points = 1025;
+constexpr int function_points = 129;
+constexpr int stretch_points = 97;     // a stretch is scored at so many points
+constexpr int overlap_points = 32;     // of the integral over an overlap
+constexpr double least_overlap = 0.1;  // |S| that is tabulated
+constexpr double least_speed = 0.5, largest_speed = 2;
+constexpr int scales_per_octave = 4, octaves = 3;  // u from 1/8 to 8
+constexpr double shift_steps = 40;                 // per unit of the faster clock
+constexpr int minima_refined = 5;
+constexpr double infinite = std::numeric_limits<double>::infinity();
+
+struct Interval {
+  double begin = 0, end = 0;
+  [[nodiscard]] double length() const { return end - begin; }
+};
+
+// S: where s and u s + v both lie in [0, 1].
+Interval overlap_of(double u, double v) {
+  return {std::max(0.0, -v / u), std::min(1.0, (1 - v) / u)};
+}
+
+// The shifts for which the overlap is at least `least` long (in s); empty (begin > end) when there are none.
+Interval shifts_for(double u, double least) {
+  return {-u * (1 - least), 1 - u * least};
+}
+
+double speed_of(const ConnectionMotion& first, const ConnectionMotion& second, double u) {
+  return u * first.length_s / second.length_s;
+}
+
+// The smallest |S| that lasts `shortest_s` by either clock.
+double least_overlap_of(const ConnectionMotion& first, const ConnectionMotion& second, double u, double shortest_s) {
+  return std::max(shortest_s / second.length_s, shortest_s / (u * first.length_s));
+}
+
+bool legal_speed(double speed) {
+  constexpr double rounding = 1e-9;
+  return speed >= least_speed - rounding && speed <= largest_speed + rounding;
+}
+
+// What motions can be scored in: an orthonormal basis (trapezoid rule) of the span of 1, the mean and the functions.
+SampleMatrix orthonormal_functions(const MotionSpace& space, int count) {
+  const auto group = std::ranges::max_element(space.groups(), {}, &FunctionGroup::variance);
+  const auto wanted = std::min<Eigen::Index>(count, group->functions.cols() + 2);
+  SampleMatrix columns(space.points(), wanted);
+  columns.col(0).setOnes();
+  columns.col(1) = group->mean;
+  columns.rightCols(wanted - 2) = group->functions.leftCols(wanted - 2);
+  const UniformSpline spline(std::move(columns));
+  SampleMatrix at(function_points, wanted);
+  for (int i = 0; i < function_points; ++i) {
+    spline.value(i * static_cast<double>(space.points() - 1) / (function_points - 1), at.row(i));
+  }
+  const Eigen::VectorXd root = trapezoid_weights(function_points, 1.0).cwiseSqrt();
+  const Eigen::MatrixXd scaled = root.asDiagonal() * at;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(scaled);
+  const Eigen::MatrixXd q = qr.householderQ() * Eigen::MatrixXd::Identity(function_points, wanted);
+  return root.cwiseInverse().asDiagonal() * q;
+}
+
+// Metres per unit of each invariant curve.
+Eigen::RowVectorXd invariant_weights(const Skeleton& skeleton) {
+  const Eigen::RowVectorXd weights = curve_weights(skeleton);
+  Eigen::RowVectorXd out(InvariantPose::size(weights.size()));
+  out.head<3>() = weights.head<3>();
+  out(3) = weights(0) * weights(3) / 2;  // a turn moves the joints by half of what its quaternion's weight says
+  out(InvariantPose::height) = 1;
+  out.tail(weights.size() - 3) = weights.tail(weights.size() - 3);
+  return out;
+}
+
+Eigen::RowVectorXd invariant_reference(const MotionSpace& space) {
+  Eigen::RowVectorXd out = Eigen::RowVectorXd::Zero(InvariantPose::size(space.curves()));
+  out(InvariantPose::rotations) = 1;
+  for (Eigen::Index j = 1; j < space.references().cols(); ++j) {
+    out.segment<4>(InvariantPose::rotations + 4 * j) = space.references().col(j).transpose();
+  }
+  return out;
+}
+
+}  // namespace
+
+void ConnectionOptions::validate() const {
+  const auto fail = [](const std::string& found, const char* expected) {
+    throw Error(ErrorKind::usage, {.found = found, .expected = expected});
+  };
+  if (!(window_s > 0.1 && window_s <= 20)) fail(fmt::format("window_s = {}", window_s), "above 0.1, up to 20");
+  if (!(shortest_s >= 0.1 && shortest_s <= window_s)) {
+    fail(fmt::format("shortest_s = {}", shortest_s), "from 0.1 to window_s");
+  }
+  if (functions < 4 || functions > 64) fail(fmt::format("functions = {}", functions), "from 4 to 64");
+}
+
+// The forms in the scores that E is made of, apart for rates and the rest.
+struct ConnectionSpace::Forms {
+  const ConnectionMotion* first;
+  const ConnectionMotion* second;
+  Eigen::MatrixXf cross_rates, cross_rest;
+
+  [[nodiscard]] double speed(double u) const { return speed_of(*first, *second, u); }
+  [[nodiscard]] Eigen::MatrixXf own_of_first(float speed) const {
+    return speed * speed * first->rates + first->rest;
+  }
+  [[nodiscard]] Eigen::MatrixXf cross(float speed) const { return speed * cross_rates + cross_rest; }
+  [[nodiscard]] Eigen::MatrixXf own_of_second() const { return second->rates + second->rest; }
+};
+
+ConnectionSpace::ConnectionSpace(const MotionSpace& space, const ConnectionOptions& options)
+    : ConnectionSpace(space, orthonormal_functions(space, options.functions), options) {}
+
+ConnectionSpace::ConnectionSpace(const MotionSpace& space, SampleMatrix functions, const ConnectionOptions& options)
+    : options_(options),
+      weights_(invariant_weights(space.skeleton())),
+      reference_(invariant_reference(space)),
+      functions_(std::move(functions)) {
+  options_.validate();
+  tabulate();
+}
+
+void ConnectionSpace::tabulate() {
+  const auto count = functions_.cols();
+  const UniformSpline spline(functions_);
+  SampleMatrix fine(fine_points, count);
+  for (int i = 0; i < fine_points; ++i) {
+    spline.value(i * static_cast<double>(functions_.rows() - 1) / (fine_points - 1), fine.row(i));
+  }
+  fine_ = fine.cast<float>();
+
+  const Eigen::Index packed = count * (count + 1) / 2;
+  Eigen::MatrixXf of_first(count, overlap_points), of_second(count, overlap_points);
+  for (int k = -octaves * scales_per_octave; k <= octaves * scales_per_octave; ++k) {
+    Cells cells{.u = std::exp2(static_cast<double>(k) / scales_per_octave)};
+    const Interval range = shifts_for(cells.u, least_overlap * std::max(1.0, 1 / cells.u));
+    const double step = std::max(1.0, cells.u) / shift_steps;
+    for (double v = range.begin; v <= range.end; v += step) cells.shifts.push_back(v);
+    cells.grams.resize(static_cast<Eigen::Index>(cells.shifts.size()), 2 * packed + count * count);
+    for (std::size_t i = 0; i < cells.shifts.size(); ++i) {
+      const Interval s = overlap_of(cells.u, cells.shifts[i]);
+      cells.overlaps.push_back(s.length());
+      for (int p = 0; p < overlap_points; ++p) {
+        const double at = s.begin + s.length() * (p + 0.5) / overlap_points;
+        interpolate(cells.u * at + cells.shifts[i], of_first.col(p).data());
+        interpolate(at, of_second.col(p).data());
+      }
+      const Eigen::MatrixXf p_form = of_first * of_first.transpose() / overlap_points;
+      const Eigen::MatrixXf q_form = of_first * of_second.transpose() / overlap_points;
+      const Eigen::MatrixXf w_form = of_second * of_second.transpose() / overlap_points;
+      auto row = cells.grams.row(static_cast<Eigen::Index>(i));
+      Eigen::Index at = 0;
+      for (const auto* form : {&p_form, &w_form}) {
+        for (Eigen::Index c = 0; c < count; ++c) {
+          for (Eigen::Index r = 0; r <= c; ++r) row(at++) = (r == c ? 1.0F : 2.0F) * (*form)(r, c);
+        }
+      }
+      for (Eigen::Index c = 0; c < count; ++c) {
+        for (Eigen::Index r = 0; r < count; ++r) row(at++) = -2.0F * q_form(r, c);
+      }
+    }
+    if (!cells.shifts.empty()) table_.push_back(std::move(cells));
+  }
+}
+
+void ConnectionSpace::interpolate(double x, float* out) const {
+  const double at = std::clamp(x, 0.0, 1.0) * (fine_points - 1);
+  const auto i = std::min(static_cast<Eigen::Index>(at), static_cast<Eigen::Index>(fine_points - 2));
+  const auto b = static_cast<float>(at - static_cast<double>(i));
+  const float* low = fine_.row(i).data();
+  const float* high = low + fine_.cols();
+  for (Eigen::Index k = 0; k < fine_.cols(); ++k) out[k] = (1 - b) * low[k] + b * high[k];
+}
+
+ConnectionMotion ConnectionSpace::stretch_of(const CurveSampler& clip, double start_s, double length_s) const {
+  SampleMatrix poses(stretch_points, weights_.size());
+  for (int i = 0; i < stretch_points; ++i) {
+    invariant_pose(clip, start_s + length_s * i / (stretch_points - 1), poses.row(i));
+  }
+  poses = ((poses.rowwise() - reference_).array().rowwise() * weights_.array()).matrix();
+  SampleMatrix functions(stretch_points, functions_.cols());
+  for (int i = 0; i < stretch_points; ++i) {
+    Eigen::RowVectorXf row(functions_.cols());
+    interpolate(static_cast<double>(i) / (stretch_points - 1), row.data());
+    functions.row(i) = row.cast<double>();
+  }
+  // Least squares rather than plain integrals: the grid of a stretch is coarser than that of the functions.
+  const Eigen::MatrixXd weighted = trapezoid_weights(stretch_points, 1.0).asDiagonal() * functions;
+  const Eigen::MatrixXd scores =
+      (weighted.transpose() * functions).ldlt().solve(weighted.transpose() * poses);
+
+  ConnectionMotion out{.start_s = start_s, .length_s = length_s, .scores = scores.cast<float>()};
+  const SampleMatrix curves = functions * scores;
+  out.least = curves.colwise().minCoeff().cast<float>();
+  out.largest = curves.colwise().maxCoeff().cast<float>();
+  const auto rates = out.scores.leftCols(InvariantPose::rates);
+  const auto rest = out.scores.rightCols(weights_.size() - InvariantPose::rates);
+  out.rates = rates * rates.transpose();
+  out.rest = rest * rest.transpose();
+  return out;
+}
+
+ConnectionMotion ConnectionSpace::end_of(const ClipCurves& clip) const {
+  const CurveSampler sampler(clip);
+  const double length = std::min(options_.window_s, sampler.duration_s() / 2);
+  return stretch_of(sampler, sampler.duration_s() - length, length);
+}
+
+ConnectionMotion ConnectionSpace::start_of(const ClipCurves& clip) const {
+  const CurveSampler sampler(clip);
+  return stretch_of(sampler, 0, std::min(options_.window_s, sampler.duration_s() / 2));
+}
+
+ConnectionSpace::Forms ConnectionSpace::forms(const ConnectionMotion& first, const ConnectionMotion& second) const {
+  const Eigen::Index rest = weights_.size() - InvariantPose::rates;
+  return {.first = &first,
+          .second = &second,
+          .cross_rates = first.scores.leftCols(InvariantPose::rates) *
+                         second.scores.leftCols(InvariantPose::rates).transpose(),
+          .cross_rest = first.scores.rightCols(rest) * second.scores.rightCols(rest).transpose()};
+}
+
+double ConnectionSpace::evaluate(const Forms& forms, double u, double v) const {
+  const Interval s = overlap_of(u, v);
+  const auto count = functions_.cols();
+  Eigen::Matrix<float, Eigen::Dynamic, overlap_points> of_first(count, overlap_points), of_second(count, overlap_points);
+  for (int p = 0; p < overlap_points; ++p) {
+    const double at = s.begin + s.length() * (p + 0.5) / overlap_points;
+    interpolate(u * at + v, of_first.col(p).data());
+    interpolate(at, of_second.col(p).data());
+  }
+  const auto speed = static_cast<float>(forms.speed(u));
+  const float sum = (forms.own_of_first(speed) * of_first).cwiseProduct(of_first).sum() -
+                    2 * (forms.cross(speed) * of_second).cwiseProduct(of_first).sum() +
+                    (forms.own_of_second() * of_second).cwiseProduct(of_second).sum();
+  return std::max(0.0, static_cast<double>(sum) / overlap_points);
+}
+
+double ConnectionSpace::cost(const ConnectionMotion& first, const ConnectionMotion& second, double u, double v,
+                             double shortest_s) const {
+  constexpr double rounding = 1e-9;
+  const double shortest = shortest_s > 0 ? shortest_s : options_.shortest_s;
+  if (!(u > 0) || !legal_speed(speed_of(first, second, u))) return infinite;
+  if (overlap_of(u, v).length() < least_overlap_of(first, second, u, shortest) - rounding) return infinite;
+  return evaluate(forms(first, second), u, v);
+}
+
+double ConnectionSpace::lower_bound_cm(const ConnectionMotion& first, const ConnectionMotion& second) const {
+  // Rates of the first are played at any legal speed.
+  Eigen::RowVectorXf least = first.least, largest = first.largest;
+  for (Eigen::Index c = 0; c < InvariantPose::rates; ++c) {
+    least(c) *= static_cast<float>(least(c) < 0 ? largest_speed : least_speed);
+    largest(c) *= static_cast<float>(largest(c) > 0 ? largest_speed : least_speed);
+  }
+  const auto gap = (least - second.largest).cwiseMax(second.least - largest).cwiseMax(0);
+  return 100 * static_cast<double>(gap.norm());
+}
+
+namespace {
+
+// A point of the legal range: the scale by its logarithm, the shift by its share of what is legal at that scale.
+struct LegalPoint {
+  double log_u = 0;
+  double share = 0;
+};
+
+}  // namespace
+
+std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first, const ConnectionMotion& second,
+                                                   double shortest_s) const {
+  const double shortest = shortest_s > 0 ? shortest_s : options_.shortest_s;
+  const double even = std::log2(second.length_s / first.length_s);  // log u at which both play at the same speed
+  const Interval scales{std::max(even - 1, -static_cast<double>(octaves)), std::min(even + 1, static_cast<double>(octaves))};
+  const auto legal_shifts = [&](double log_u) {
+    const double u = std::exp2(log_u);
+    return shifts_for(u, least_overlap_of(first, second, u, shortest));
+  };
+
+  // The table's cells, each with the value of the best of its neighbourhood along the shift.
+  const Forms parts = forms(first, second);
+  const auto count = functions_.cols();
+  const Eigen::Index packed = count * (count + 1) / 2;
+  struct Minimum {
+    double cost = 0;
+    LegalPoint at;
+  };
+  std::vector<Minimum> minima;
+  Eigen::VectorXf form(2 * packed + count * count);
+  const Eigen::MatrixXf second_own = parts.own_of_second();
+  Eigen::VectorXf costs;
+  for (const Cells& cells : table_) {
+    const double log_u = std::log2(cells.u);
+    if (log_u < scales.begin - 1e-9 || log_u > scales.end + 1e-9) continue;
+    const Interval legal = legal_shifts(log_u);
+    if (legal.begin > legal.end) continue;
+    const auto begin = std::ranges::lower_bound(cells.shifts, legal.begin) - cells.shifts.begin();
+    const auto end = std::ranges::upper_bound(cells.shifts, legal.end) - cells.shifts.begin();
+    const auto speed = static_cast<float>(parts.speed(cells.u));
+    const Eigen::MatrixXf first_own = parts.own_of_first(speed);
+    const Eigen::MatrixXf cross = parts.cross(speed);
+    Eigen::Index at = 0;
+    for (const auto* own : {&first_own, &second_own}) {
+      for (Eigen::Index c = 0; c < count; ++c, at += c) form.segment(at, c + 1) = own->col(c).head(c + 1);
+    }
+    form.tail(count * count) = cross.reshaped();
+    costs = cells.grams.middleRows(begin, end - begin) * form;
+    const double width = std::max(legal.length(), 1e-12);
+    for (Eigen::Index i = 0; i < costs.size(); ++i) {
+      const bool lowest = (i == 0 || costs(i) <= costs(i - 1)) && (i + 1 == costs.size() || costs(i) <= costs(i + 1));
+      if (!lowest) continue;
+      const double v = cells.shifts[static_cast<std::size_t>(begin + i)];
+      minima.push_back({costs(i), {log_u, std::clamp((v - legal.begin) / width, 0.0, 1.0)}});
+    }
+    if (costs.size() == 0) minima.push_back({infinite, {log_u, 0.5}});
+  }
+  if (minima.empty()) {  // a range of scales or shifts between two cells of the table
+    const double log_u = std::clamp(even, scales.begin, scales.end);
+    if (scales.begin > scales.end || legal_shifts(log_u).begin > legal_shifts(log_u).end) return std::nullopt;
+    minima.push_back({infinite, {log_u, 0.5}});
+  }
+  std::ranges::stable_sort(minima, {}, &Minimum::cost);
+
+  // Descent along the two coordinates, with steps that halve: the box holds all that is legal.
+  const auto shift_at = [&](const LegalPoint& point) {
+    const Interval legal = legal_shifts(point.log_u);
+    return legal.begin + point.share * legal.length();
+  };
+  const auto value_at = [&](const LegalPoint& point) {
+    const Interval legal = legal_shifts(point.log_u);
+    return legal.begin > legal.end ? infinite : evaluate(parts, std::exp2(point.log_u), shift_at(point));
+  };
+  Minimum best{infinite, {}};
+  std::vector<LegalPoint> tried;
+  for (const Minimum& start : minima) {
+    if (tried.size() == minima_refined) break;
+    const bool near = std::ranges::any_of(tried, [&](const LegalPoint& other) {
+      return std::abs(other.log_u - start.at.log_u) < 0.6 && std::abs(other.share - start.at.share) < 0.06;
+    });
+    if (near) continue;
+    tried.push_back(start.at);
+    Minimum here{value_at(start.at), start.at};
+    double scale_step = 0.5 / scales_per_octave, share_step = 0.5 / shift_steps;
+    for (int round = 0; round < 7; ++round) {
+      bool moved = true;
+      for (int tries = 0; moved && tries < 4; ++tries) {
+        moved = false;
+        for (const auto& [du, dv] : std::array<std::array<double, 2>, 4>{{{0, 1}, {0, -1}, {1, 0}, {-1, 0}}}) {
+          const LegalPoint next{std::clamp(here.at.log_u + du * scale_step, scales.begin, scales.end),
+                                std::clamp(here.at.share + dv * share_step, 0.0, 1.0)};
+          if (next.log_u == here.at.log_u && next.share == here.at.share) continue;
+          const double value = value_at(next);
+          if (value < here.cost) {
+            here = {value, next};
+            moved = true;
+          }
+        }
+      }
+      scale_step /= 2;
+      share_step /= 2;
+    }
+    if (here.cost < best.cost) best = here;
+  }
+  if (best.cost == infinite) return std::nullopt;
+
+  Connection out{.scale = std::exp2(best.at.log_u), .shift = shift_at(best.at), .cost_cm = 100 * std::sqrt(best.cost)};
+  const Interval s = overlap_of(out.scale, out.shift);
+  out.leave_s = first.start_s + first.length_s * (out.scale * s.begin + out.shift);
+  out.left_s = first.start_s + first.length_s * (out.scale * s.end + out.shift);
+  out.enter_s = second.start_s + second.length_s * s.begin;
+  out.entered_s = second.start_s + second.length_s * s.end;
+  return out;
+}
+
+namespace reference {
+
+std::optional<Connection> connect(const ConnectionSpace& space, const ConnectionMotion& first,
+                                  const ConnectionMotion& second, int scales, int shifts) {
+  constexpr int points = 200;
+  const double shortest = space.options().shortest_s;
+  const UniformSpline functions(space.functions());
+  const auto curves_at = [&](const ConnectionMotion& motion, double x, Eigen::RowVectorXd& out) {
+    Eigen::RowVectorXd row(space.functions().cols());
+    functions.value(x * static_cast<double>(space.functions().rows() - 1), row);
+    out = row * motion.scores.cast<double>();
+  };
+  // Each motion's curves on a fine grid, so that the many evaluations below share them.
+  constexpr int grid = 2001;
+  SampleMatrix of_first(grid, first.scores.cols()), of_second(grid, second.scores.cols());
+  Eigen::RowVectorXd row;
+  for (int i = 0; i < grid; ++i) {
+    curves_at(first, static_cast<double>(i) / (grid - 1), row);
+    of_first.row(i) = row;
+    curves_at(second, static_cast<double>(i) / (grid - 1), row);
+    of_second.row(i) = row;
+  }
+  const auto at = [](const SampleMatrix& curves, double x) -> Eigen::RowVectorXd {
+    const double p = std::clamp(x, 0.0, 1.0) * (grid - 1);
+    const auto i = std::min(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(grid - 2));
+    const double b = p - static_cast<double>(i);
+    return (1 - b) * curves.row(i) + b * curves.row(i + 1);
+  };
+
+  std::optional<Connection> best;
+  double least = infinite;
+  for (int i = 0; i < scales; ++i) {
+    const double speed = least_speed * std::pow(largest_speed / least_speed, static_cast<double>(i) / (scales - 1));
+    const double u = speed * second.length_s / first.length_s;
+    const Interval legal = shifts_for(u, least_overlap_of(first, second, u, shortest));
+    if (legal.begin > legal.end) continue;
+    for (int k = 0; k < shifts; ++k) {
+      const double v = legal.begin + legal.length() * k / (shifts - 1);
+      const Interval s = overlap_of(u, v);
+      double sum = 0;
+      for (int p = 0; p < points; ++p) {
+        const double x = s.begin + s.length() * (p + 0.5) / points;
+        Eigen::RowVectorXd difference = at(of_first, u * x + v);
+        difference.head<InvariantPose::rates>() *= speed;
+        sum += (difference - at(of_second, x)).squaredNorm();
+      }
+      if (sum / points < least) {
+        least = sum / points;
+        best = Connection{.scale = u, .shift = v, .cost_cm = 100 * std::sqrt(least)};
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace reference
+
+}  // namespace kinespace

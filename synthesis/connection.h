@@ -1,0 +1,124 @@
+// Where one motion goes over into another (yoo2019, section 6.2, eq. 15).
+//
+// Motion 1 is left and motion 2 is entered: f1 are the last `window_s` seconds of the first (at most its second half),
+// f2 the first `window_s` seconds of the second (at most its first half), each over its own time [0, 1]. The scale u
+// and the shift v are sought for which motion 1 at time u s + v is most like motion 2 at time s,
+//
+//   E(u, v) = 1 / |S| integral over S of  sum_c w_c^2 (r_c f1_c(u s + v) - f2_c(s))^2 ds,     S = {s : s, u s + v in
+//   [0, 1]}
+//
+// the mean over the overlap S, not the integral: else the smallest overlap always wins. The curves c are those that a
+// rigid motion in the ground plane leaves as they are (curve_sampler.h), so that places and directions do not count;
+// curves that are rates change with the speed of play, r_c = u L1 / L2, other r_c = 1. w_c turns a curve into metres.
+//
+// With f(s) = sum_k x_k b_k(s) in K orthonormal functions of the motion space, E is a sum of three forms in the scores,
+//
+//   E = <P, S11> - 2 <Q, S12> + <W, S22>,   P = mean b(u s + v) b(u s + v)',  Q = mean b(u s + v) b(s)',  W = mean b(s)
+//   b(s)'
+//
+// and P, Q, W do not depend on the motions: they are tabulated once over a grid of (u, v). The best cells of the grid
+// are refined to the nearest minimum.
+//
+// Legal: the overlap lasts at least `shortest_s` by the clock of either motion, and motion 1 is played at 1/2 to 2
+// times the speed of motion 2.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "fpca/motion_space.h"
+#include "synthesis/curve_sampler.h"
+
+namespace kinespace {
+
+struct ConnectionOptions {
+  double window_s = 2;      // (0.1, 20]; how much of the end of one and of the start of the other may overlap
+  double shortest_s = 0.3;  // [0.1, window_s]; the smallest overlap by either clock
+  int functions = 20;       // 4 .. 64 of the space: K
+
+  // Throws Error{usage} naming field, value and legal range.
+  void validate() const;
+};
+
+// The end or the start of a motion, as connections see it.
+struct ConnectionMotion {
+  double start_s = 0;      // of the clip
+  double length_s = 0;     // L
+  Eigen::MatrixXf scores;  // K x C, each curve times its w_c
+  // What bounds a connection from below: least and largest value of each weighted curve.
+  Eigen::RowVectorXf least, largest;
+  Eigen::MatrixXf rates, rest;  // K x K: the motion's own parts of S, of curves that are rates and of the rest
+};
+
+struct Connection {
+  double scale = 1;    // u, in the motions' own times [0, 1]
+  double shift = 0;    // v
+  double cost_cm = 0;  // sqrt(E) in cm: the root mean square distance of the joints, roughly
+  // The overlap by the clocks of the two clips, in seconds.
+  double leave_s = 0, left_s = 0;     // of the first: where it begins and where it ends
+  double enter_s = 0, entered_s = 0;  // of the second
+  // How fast the first is played where the second has speed 1.
+  [[nodiscard]] double speed() const { return (left_s - leave_s) / (entered_s - enter_s); }
+};
+
+class ConnectionSpace {
+ public:
+  ConnectionSpace(const MotionSpace& space, const ConnectionOptions& options = {});
+  // With functions that were kept (as functions() gives them) from an earlier state of the space.
+  ConnectionSpace(const MotionSpace& space, SampleMatrix functions, const ConnectionOptions& options);
+
+  // Of clips whose curves are on the space's side (MotionSpace::apply_references). Throws Error{usage} when half of the
+  // clip is shorter than the smallest overlap.
+  [[nodiscard]] ConnectionMotion end_of(const ClipCurves& clip) const;
+  [[nodiscard]] ConnectionMotion start_of(const ClipCurves& clip) const;
+  // Any stretch of a clip.
+  [[nodiscard]] ConnectionMotion stretch_of(const CurveSampler& clip, double start_s, double length_s) const;
+  // Whether the clip is long enough to be left or entered.
+  [[nodiscard]] bool long_enough(double duration_s) const { return duration_s / 2 >= options_.shortest_s; }
+
+  // The best connection over the whole legal range, in which the overlap lasts `shortest_s` (that of the options when
+  // 0) or longer; none when there is no legal (u, v).
+  [[nodiscard]] std::optional<Connection> connect(const ConnectionMotion& first, const ConnectionMotion& second,
+                                                  double shortest_s = 0) const;
+
+  // E(u, v) of eq. 15, in square metres, for one (u, v); infinity where it is not legal.
+  [[nodiscard]] double cost(const ConnectionMotion& first, const ConnectionMotion& second, double u, double v,
+                            double shortest_s = 0) const;
+  // No connection of the two costs less (sqrt(E) in cm).
+  [[nodiscard]] double lower_bound_cm(const ConnectionMotion& first, const ConnectionMotion& second) const;
+
+  [[nodiscard]] const ConnectionOptions& options() const { return options_; }
+  // [point][function]: K functions on a regular grid over [0, 1], orthonormal.
+  [[nodiscard]] const SampleMatrix& functions() const { return functions_; }
+
+ private:
+  struct Cells {  // all shifts of one scale
+    double u = 0;
+    std::vector<double> shifts;
+    std::vector<double> overlaps;                                                 // |S|
+    Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> grams;  // [shift][P, 2Q, W]
+  };
+  struct Forms;
+  void tabulate();
+  void interpolate(double x, float* out) const;
+  [[nodiscard]] Forms forms(const ConnectionMotion& first, const ConnectionMotion& second) const;
+  [[nodiscard]] double evaluate(const Forms& forms, double u, double v) const;
+
+  ConnectionOptions options_;
+  Eigen::RowVectorXd weights_;    // w_c of the invariant curves
+  Eigen::RowVectorXd reference_;  // taken off each curve before it is scored: changes no difference, keeps digits
+  SampleMatrix functions_;
+  Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> fine_;  // the functions, finely
+  std::vector<Cells> table_;
+};
+
+namespace reference {
+// The best (u, v) of a fine grid over the legal range, its borders included, each E by direct integration of the
+// curves' difference: what connect is tested against.
+[[nodiscard]] std::optional<Connection> connect(const ConnectionSpace& space, const ConnectionMotion& first,
+                                                const ConnectionMotion& second, int scales = 97, int shifts = 400);
+}  // namespace reference
+
+}  // namespace kinespace
