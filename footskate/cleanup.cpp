@@ -1,0 +1,153 @@
+#include "footskate/cleanup.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "footskate/leg_pose.h"
+#include "footskate/root_path.h"
+#include "footskate/skate_measures.h"
+
+namespace kinespace {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double settled_cm = 0.05;  // a pass that moves nothing by more is not needed
+
+// The levels that the foot of a leg may not go below, one a frame: the ground; uneven: the lower of the plants before
+// and after.
+std::vector<double> levels(const FootTracks& t, const Ground& ground, const std::vector<Plant>& plants, int leg) {
+  std::vector<double> out(t.frames, ground.height_cm);
+  if (ground.kind != GroundKind::uneven) return out;
+  std::vector<double> stand(t.frames, std::nan(""));
+  const int slot = t.has(2 * leg + 1) ? 2 * leg + 1 : 2 * leg;
+  for (const Plant& p : plants) {
+    if (p.contact.slot != slot) continue;
+    std::fill(stand.begin() + p.contact.first_frame, stand.begin() + p.contact.last_frame + 1, p.place.y());
+  }
+  std::vector<double> before = stand;
+  for (int f = 1; f < t.frames; ++f) {
+    if (std::isnan(before[f])) before[f] = before[f - 1];
+  }
+  for (int f = t.frames - 2; f >= 0; --f) {
+    if (std::isnan(stand[f])) stand[f] = stand[f + 1];
+  }
+  for (int f = 0; f < t.frames; ++f) {
+    const double low = std::fmin(before[f], stand[f]);
+    out[f] = std::isnan(low) ? ground.height_cm : low;
+  }
+  return out;
+}
+
+// Lifts the ankle's goals where ankle or toe would be under the ground.
+void keep_above(const FootTracks& t, const Ground& ground, const std::vector<Plant>& plants, int leg,
+                const FootTask& task, LegGoals::Side& goals) {
+  const std::vector<double> level = levels(t, ground, plants, leg);
+  for (int f = 0; f < t.frames; ++f) {
+    if (task.planted[f] != 0) continue;
+    const auto floor_at = [&](const Vector3d& p) { return ground.kind == GroundKind::slope ? ground.at(p) : level[f]; };
+    const Vector3d ankle = goals.ankle[f];
+    double lift = floor_at(ankle) - ankle.y();
+    if (t.has(2 * leg + 1)) {
+      Vector3d way = t.at[2 * leg + 1][f] - t.at[2 * leg][f];
+      const double angle = goals.foot_turn[f].norm();
+      if (angle > 0) way = Eigen::AngleAxisd(angle, goals.foot_turn[f] / angle) * way;
+      const Vector3d toe = ankle + way;
+      lift = std::max(lift, floor_at(toe) - toe.y());
+    }
+    if (lift > 0) goals.ankle[f].y() += lift;
+  }
+}
+
+LegGoals goals_for(const FootTracks& t, const Ground& ground, const std::vector<Plant>& plants) {
+  const std::array<FootTask, 2> tasks = {foot_task(t, 0, plants), foot_task(t, 1, plants)};
+  LegGoals out{.root_shift = root_shift(t, tasks), .sides = {}};
+  for (int leg = 0; leg < 2; ++leg) {
+    LegGoals::Side& side = out.sides[leg];
+    std::vector<Vector3d> change = tasks[leg].displacement;  // of the ankle against the root
+    for (int f = 0; f < t.frames; ++f) change[f] -= out.root_shift[f];
+    join_between(tasks[leg].planted, t.rate_hz, change);
+    for (int f = 0; f < t.frames; ++f) side.ankle.push_back(t.at[2 * leg][f] + out.root_shift[f] + change[f]);
+    side.foot_turn = tasks[leg].turn;
+    keep_above(t, ground, plants, leg, tasks[leg], side);
+  }
+  return out;
+}
+
+Ground ground_for(const FootTracks& tracks, const CleanOptions& options) {
+  return options.floor_cm ? Ground{.height_cm = *options.floor_cm} : estimate_ground(tracks);
+}
+
+FootContacts contacts_for(const FootTracks& tracks, const Ground& ground, const CleanOptions& options) {
+  if (options.contacts) return *options.contacts;
+  return contacts_by_rule(tracks, ground);
+}
+
+void check_contacts(const Clip& clip, const FootTracks& tracks, const FootContacts& contacts) {
+  for (const FootContact& c : contacts) {
+    const bool good = c.slot >= 0 && c.slot < 4 && tracks.has(c.slot) && c.first_frame >= 0 &&
+                      c.first_frame <= c.last_frame && c.last_frame < clip.frames;
+    if (good) continue;
+    throw Error(ErrorKind::bad_input,
+                {.file = clip.name,
+                 .found = fmt::format("a contact of slot {} in frames {} to {}", c.slot, c.first_frame, c.last_frame),
+                 .expected = fmt::format("a joint of a foot and frames 0 to {}", clip.frames - 1),
+                 .remedy = {}});
+  }
+}
+
+void measure(const Clip& before, const FootTracks& tracks, const FootContacts& contacts, CleanResult& result) {
+  CleanReport& report = result.report;
+  const FootTracks after = foot_tracks(result.clip, report.feet);
+  report.foot_slide_before_cm_s = foot_slide_cm_s(tracks, contacts);
+  report.foot_slide_after_cm_s = foot_slide_cm_s(after, contacts);
+  report.floor_penetration_cm = floor_penetration_cm(after, report.ground);
+  report.mean_pose_change_cm = mean_pose_change_cm(before, result.clip);
+  report.largest_move_cm = largest_move_cm(before, result.clip);
+  const double was = largest_acceleration_cm_s2(before);
+  report.acceleration_ratio = was > 0 ? largest_acceleration_cm_s2(result.clip) / was : 1;
+}
+
+}  // namespace
+
+void CleanOptions::validate() const {
+  const auto require = [](const char* field, double value, double low, double high) {
+    if (value >= low && value <= high) return;
+    throw Error(
+        ErrorKind::usage,
+        {.found = fmt::format("{} = {}", field, value), .expected = fmt::format("{} to {}", low, high), .remedy = {}});
+  };
+  if (floor_cm) require("floor_cm", *floor_cm, -1e5, 1e5);
+  require("passes", passes, 1, 10);
+}
+
+CleanResult clean(const Clip& clip, const CleanOptions& options) {
+  options.validate();
+  CleanResult out{.clip = clip, .report = {}};
+  out.report.feet = require_feet(clip, options.feet);
+  const FootTracks first = foot_tracks(clip, out.report.feet);
+  FootTracks tracks = first;
+  out.report.ground = ground_for(tracks, options);
+  const FootContacts contacts = contacts_for(tracks, out.report.ground, options);
+  check_contacts(clip, tracks, contacts);
+  for (int pass = 0; pass < options.passes; ++pass) {
+    const Ground ground = ground_for(tracks, options);
+    std::vector<Plant> plants =
+        place_plants(tracks, ground, pass == 0 ? contacts : contacts_for(tracks, ground, options));
+    Clip posed = pose_legs(out.clip, out.report.feet, goals_for(tracks, ground, plants));
+    const bool settled = largest_move_cm(out.clip, posed) <= settled_cm;
+    if (pass > 0 && settled) break;
+    out.clip = std::move(posed);
+    out.report.plants = std::move(plants);
+    out.report.passes = pass + 1;
+    if (settled) break;
+    tracks = foot_tracks(out.clip, out.report.feet);
+  }
+  measure(clip, first, contacts, out);
+  return out;
+}
+
+}  // namespace kinespace

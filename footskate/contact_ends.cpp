@@ -1,0 +1,88 @@
+#include <algorithm>
+#include <cmath>
+
+#include "footskate/contacts.h"
+
+namespace kinespace {
+namespace {
+
+// Where a joint that keeps sliding as it does would be: x and z run on a line, y stays.
+struct Slide {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // cm, at `centre`
+  Eigen::Vector3d speed = Eigen::Vector3d::Zero();  // cm a frame
+  double centre = 0;                                // frame
+  double stray = 0;                                 // cm: root mean square of what is left
+
+  [[nodiscard]] Eigen::Vector3d at(double frame) const { return place + speed * (frame - centre); }
+};
+
+Slide fit_slide(const Path& path, int first, int last) {
+  const double count = last - first + 1;
+  Slide out{.centre = 0.5 * (first + last)};
+  for (int f = first; f <= last; ++f) out.place += path[f] / count;
+  double squares = 0;
+  for (int f = first; f <= last; ++f) {
+    out.speed += (f - out.centre) * (path[f] - out.place);
+    squares += (f - out.centre) * (f - out.centre);
+  }
+  out.speed *= count >= 4 ? 1 / squares : 0;
+  out.speed.y() = 0;
+  double sum = 0;
+  for (int f = first; f <= last; ++f) sum += (path[f] - out.at(f)).squaredNorm();
+  out.stray = std::sqrt(sum / count);
+  return out;
+}
+
+class EndFitter {
+ public:
+  EndFitter(const FootTracks& tracks, const FootContact& contact)
+      : tracks_(tracks), path_(tracks.at[contact.slot]), contact_(contact) {}
+
+  // The end in the direction `step`, -1 or 1.
+  [[nodiscard]] int end(int step) const {
+    const int length = contact_.last_frame - contact_.first_frame + 1;
+    const int inset = std::min(length / 6, static_cast<int>(0.05 * tracks_.rate_hz));
+    const int window = std::clamp(static_cast<int>(0.2 * tracks_.rate_hz), 3, std::max(3, length - 2 * inset));
+    const int from = step > 0 ? contact_.last_frame - inset : contact_.first_frame + inset;
+    const int back = std::clamp(from - step * (window - 1), contact_.first_frame, contact_.last_frame);
+    const Slide slide = fit_slide(path_, std::min(from, back), std::max(from, back));
+    const int beyond = static_cast<int>(std::lround(0.1 * tracks_.rate_hz));
+    const int limit =
+        std::clamp((step > 0 ? contact_.last_frame : contact_.first_frame) + step * beyond, 0, tracks_.frames - 1);
+    int f = from;
+    while (f != limit && keeps(slide, f + step, std::abs(f + step - from))) f += step;
+    return f;
+  }
+
+ private:
+  [[nodiscard]] bool keeps(const Slide& slide, int frame, int distance) const {
+    const double length = tracks_.feet.leg_length_cm;
+    const double near = std::clamp(4 * slide.stray, 0.00004 * length, 0.006 * length);
+    return (path_[frame] - slide.at(frame)).norm() <= near + 0.15 * slide.speed.norm() * distance;
+  }
+
+  const FootTracks& tracks_;
+  const Path& path_;
+  FootContact contact_;
+};
+
+}  // namespace
+
+FootContacts fit_ends(const FootTracks& tracks, const FootContacts& contacts) {
+  FootContacts out;
+  for (int slot = 0; slot < 4; ++slot) {
+    std::vector<char> planted(tracks.frames, 0);
+    for (const FootContact& c : contacts) {
+      if (c.slot != slot) continue;
+      const EndFitter fitter(tracks, c);
+      const int first = fitter.end(-1);
+      const int last = fitter.end(1);
+      if (last - first < 0.05 * tracks.rate_hz - 1e-9) continue;
+      std::fill(planted.begin() + first, planted.begin() + last + 1, 1);
+    }
+    append_runs(planted, slot, out);
+  }
+  return out;
+}
+
+}  // namespace kinespace

@@ -1,0 +1,49 @@
+// When which joint of a foot stands: contacts.
+//
+// A contact is a time in which an ankle or a toe joint keeps its place on the ground. A step that rolls over the ball
+// of the foot has two that overlap: the ankle's while the foot is flat, the toe's until it leaves. In a clip with foot
+// skate the joint slides during the contact; that is what cleanup takes out.
+//
+// Where contacts are found, two ways (contacts_by_rule here, ContactModel in footskate/contact_model.h); both end by
+// `fit_ends`, which moves each end to the frame where the joint leaves its place.
+#pragma once
+
+#include <vector>
+
+#include "footskate/foot_tracks.h"
+#include "footskate/ground.h"
+
+namespace kinespace {
+
+struct FootContact {
+  int slot = 0;  // of Feet::foot_joints: 0 left ankle, 1 left toe, 2 right ankle, 3 right toe
+  int first_frame = 0;
+  int last_frame = 0;  // included
+  bool operator==(const FootContact&) const = default;
+};
+
+// By slot, then by time; contacts of one slot do not touch.
+using FootContacts = std::vector<FootContact>;
+
+// The rule of height and speed: a rest (footskate/ground.h) whose height over the ground is that of a standing foot
+// within 5 % of the leg length. On uneven ground any height will do if, at some time in the rest, the other foot has
+// none: then it bears the body, and is not a foot held still in the air.
+[[nodiscard]] FootContacts contacts_by_rule(const FootTracks& tracks, const Ground& ground);
+
+// The height of each slot over the ground while its foot stands flat, cm: the median over rests; 0 for toes. Ankles of
+// a foot without toes: 0.
+[[nodiscard]] std::array<double, 4> standing_heights(const FootTracks& tracks, const Ground& ground);
+
+// Moves the ends of contacts to where the joint leaves its place: a line is fitted to the last 0.2 s within the end (a
+// constant for the height), and the contact reaches as far as the joint keeps to it. How near it must keep is 4 times
+// what it strays within, at least 0.00004 and at most 0.006 leg lengths, and 15 % of the way it has slid since. An end
+// moves out by 0.1 s at most. Contacts of a slot that meet are joined; those under 50 ms are dropped.
+[[nodiscard]] FootContacts fit_ends(const FootTracks& tracks, const FootContacts& contacts);
+
+// Whether each frame of a slot is in one of the contacts.
+[[nodiscard]] std::vector<char> planted_frames(const FootContacts& contacts, int slot, int frames);
+
+// The runs of set frames as contacts of the slot.
+void append_runs(const std::vector<char>& planted, int slot, FootContacts& out);
+
+}  // namespace kinespace

@@ -1,0 +1,209 @@
+#include "footskate/plants.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Geometry>
+
+namespace kinespace {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double ground_band = 0.05;  // leg lengths
+
+int overlap(const FootContact& a, const FootContact& b) {
+  return std::min(a.last_frame, b.last_frame) - std::max(a.first_frame, b.first_frame) + 1;
+}
+
+int length(const FootContact& c) {
+  return c.last_frame - c.first_frame + 1;
+}
+
+double median_height(const Path& path, const FootContact& c) {
+  std::vector<double> heights;
+  for (int f = c.first_frame; f <= c.last_frame; ++f) heights.push_back(path[f].y());
+  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
+  std::ranges::nth_element(heights, middle);
+  return *middle;
+}
+
+class Placer {
+ public:
+  Placer(const FootTracks& tracks, const Ground& ground, const FootContacts& contacts) : t_(tracks), ground_(ground) {
+    for (const FootContact& c : contacts) plants_.push_back({.contact = c});
+    placed_.assign(plants_.size(), 0);
+  }
+
+  std::vector<Plant> place() {
+    std::vector<std::size_t> order(plants_.size());
+    for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+    std::ranges::stable_sort(
+        order, [&](std::size_t a, std::size_t b) { return length(plants_[a].contact) > length(plants_[b].contact); });
+    for (const std::size_t i : order) {
+      if (placed_[i] == 0) place_stance(i);
+    }
+    return std::move(plants_);
+  }
+
+ private:
+  // The longest contact of a stance by itself, then those that overlap with what is placed, from it.
+  void place_stance(std::size_t first) {
+    plants_[first].place = own_place(plants_[first].contact);
+    placed_[first] = 1;
+    std::vector<std::size_t> open = {first};
+    while (!open.empty()) {
+      const std::size_t from = open.back();
+      open.pop_back();
+      for (std::size_t i = 0; i < plants_.size(); ++i) {
+        const FootContact& a = plants_[from].contact;
+        const FootContact& b = plants_[i].contact;
+        if (placed_[i] != 0 || a.slot / 2 != b.slot / 2 || a.slot == b.slot || overlap(a, b) < 1) continue;
+        plants_[i].place = plants_[from].place + mean_way(a, b);
+        placed_[i] = 1;
+        open.push_back(i);
+      }
+    }
+  }
+
+  [[nodiscard]] Vector3d own_place(const FootContact& c) const {
+    const Path& path = t_.at[c.slot];
+    Vector3d sum = Vector3d::Zero();
+    for (int f = c.first_frame; f <= c.last_frame; ++f) sum += path[f];
+    Vector3d place = sum / length(c);
+    place.y() = median_height(path, c);
+    const bool is_lowest = c.slot % 2 == 1 || !t_.has(c.slot + 1);
+    const bool level = ground_.kind != GroundKind::uneven;
+    const double above = place.y() - ground_.at(place);
+    if (is_lowest && level && std::abs(above) <= ground_band * t_.feet.leg_length_cm) place.y() -= above;
+    return place;
+  }
+
+  // From the joint of `a` to that of `b`: as long as in the first common frame, in the mean direction of all of them.
+  [[nodiscard]] Vector3d mean_way(const FootContact& a, const FootContact& b) const {
+    const int first = std::max(a.first_frame, b.first_frame);
+    Vector3d sum = Vector3d::Zero();
+    for (int f = first; f <= std::min(a.last_frame, b.last_frame); ++f) sum += t_.at[b.slot][f] - t_.at[a.slot][f];
+    return sum.normalized() * (t_.at[b.slot][first] - t_.at[a.slot][first]).norm();
+  }
+
+  const FootTracks& t_;
+  const Ground& ground_;
+  std::vector<Plant> plants_;
+  std::vector<char> placed_;
+};
+
+Vector3d turn_between(const Vector3d& from, const Vector3d& to) {
+  const Eigen::AngleAxisd turn(Eigen::Quaterniond::FromTwoVectors(from, to));
+  return turn.angle() * turn.axis();
+}
+
+Vector3d turned(const Vector3d& turn, const Vector3d& v) {
+  const double angle = turn.norm();
+  return angle > 0 ? Eigen::AngleAxisd(angle, turn / angle) * v : v;
+}
+
+// The place at each frame of a joint that stands, else nullptr.
+std::vector<const Vector3d*> places(const std::vector<Plant>& plants, int slot, int frames) {
+  std::vector<const Vector3d*> out(frames, nullptr);
+  for (const Plant& p : plants) {
+    if (p.contact.slot != slot) continue;
+    std::fill(out.begin() + p.contact.first_frame, out.begin() + p.contact.last_frame + 1, &p.place);
+  }
+  return out;
+}
+
+// The mean speed of the values over at most `span` steps from frame `from` on in the direction `step`, per frame.
+Vector3d speed_at(const std::vector<Vector3d>& values, const std::vector<char>& known, int from, int step, int span) {
+  int far = from;
+  for (int i = 0; i < span; ++i) {
+    const int next = far + step;
+    if (next < 0 || next >= static_cast<int>(known.size()) || known[next] == 0) break;
+    far = next;
+  }
+  return far == from ? Vector3d::Zero() : Vector3d((values[from] - values[far]) / (from - far));
+}
+
+double smootherstep(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * x * (x * (6 * x - 15) + 10);
+}
+
+// At s = 0 of value 0 and slope 1, flat to second order at s >= 1.
+double run_out(double s) {
+  return s >= 1 ? 0 : s * (1 + s * s * (-6 + s * (8 - 3 * s)));
+}
+
+struct GapEnd {
+  bool known = false;
+  int frame = 0;
+  Vector3d value = Vector3d::Zero();
+  Vector3d speed = Vector3d::Zero();  // per frame
+};
+
+Vector3d joined(const GapEnd& a, const GapEnd& b, int f, double rate_hz) {
+  const double ease = 0.5 * rate_hz;   // frames to ease to zero at the ends of the clip
+  const double coast = 0.4 * rate_hz;  // frames in which a speed runs out
+  const double gap = a.known && b.known ? b.frame - a.frame : ease;
+  const double run = std::min(gap, coast);
+  Vector3d out = Vector3d::Zero();
+  if (a.known) {
+    const double s = (f - a.frame) / run;
+    out += (1 - smootherstep((f - a.frame) / gap)) * a.value + run * run_out(s) * a.speed;
+  }
+  if (b.known) {
+    const double s = (b.frame - f) / run;
+    out += (1 - smootherstep((b.frame - f) / gap)) * b.value - run * run_out(s) * b.speed;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<Plant> place_plants(const FootTracks& tracks, const Ground& ground, const FootContacts& contacts) {
+  return Placer(tracks, ground, contacts).place();
+}
+
+FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& plants) {
+  const std::size_t frames = tracks.frames;
+  FootTask out{.planted = std::vector<char>(frames, 0),
+               .flat = std::vector<char>(frames, 0),
+               .turn = std::vector<Vector3d>(frames, Vector3d::Zero()),
+               .displacement = std::vector<Vector3d>(frames, Vector3d::Zero())};
+  const auto ankle = places(plants, 2 * leg, tracks.frames);
+  const auto toe = places(plants, 2 * leg + 1, tracks.frames);
+  const Path& ankle_path = tracks.at[2 * leg];
+  const Path& toe_path = tracks.at[2 * leg + 1];
+  for (std::size_t f = 0; f < frames; ++f) {
+    out.planted[f] = ankle[f] != nullptr || toe[f] != nullptr ? 1 : 0;
+    out.flat[f] = ankle[f] != nullptr && toe[f] != nullptr ? 1 : 0;
+    if (out.flat[f] != 0) out.turn[f] = turn_between(toe_path[f] - ankle_path[f], *toe[f] - *ankle[f]);
+  }
+  join_between(out.flat, tracks.rate_hz, out.turn);
+  for (std::size_t f = 0; f < frames; ++f) {
+    if (ankle[f] != nullptr) {
+      out.displacement[f] = *ankle[f] - ankle_path[f];
+    } else if (toe[f] != nullptr) {
+      out.displacement[f] = *toe[f] - turned(out.turn[f], toe_path[f] - ankle_path[f]) - ankle_path[f];
+    }
+  }
+  return out;
+}
+
+void join_between(const std::vector<char>& known, double rate_hz, std::vector<Vector3d>& values) {
+  const int frames = static_cast<int>(known.size());
+  const int span = std::max(1, static_cast<int>(std::lround(0.06 * rate_hz)));
+  for (int f = 0; f < frames; ++f) {
+    if (known[f] != 0) continue;
+    int last = f;
+    while (last + 1 < frames && known[last + 1] == 0) ++last;
+    GapEnd a{.known = f > 0, .frame = f - 1};
+    GapEnd b{.known = last + 1 < frames, .frame = last + 1};
+    if (a.known) a = {true, a.frame, values[a.frame], speed_at(values, known, a.frame, -1, span)};
+    if (b.known) b = {true, b.frame, values[b.frame], speed_at(values, known, b.frame, 1, span)};
+    for (int i = f; i <= last; ++i) values[i] = joined(a, b, i, rate_hz);
+    f = last;
+  }
+}
+
+}  // namespace kinespace

@@ -1,0 +1,40 @@
+// Where planted feet shall stand: one place for every contact, and for the foot as a whole the displacement that takes
+// it there, over all frames.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "footskate/contacts.h"
+
+namespace kinespace {
+
+struct Plant {
+  FootContact contact;
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // cm, world: where the joint stands in all of these frames
+};
+
+// One place a contact. Contacts of one foot that overlap are one stance: the joint that stands longest gets the mean of
+// its places across the ground and the median of its heights, on the ground where it is within 5 % of the leg length
+// of it; the other joint stands at the foot's length from it, in the mean direction of the frames in which both stand.
+[[nodiscard]] std::vector<Plant> place_plants(const FootTracks& tracks, const Ground& ground,
+                                              const FootContacts& contacts);
+
+// What one foot must do in its planted frames.
+struct FootTask {
+  std::vector<char> planted;                  // ankle or toe
+  std::vector<char> flat;                     // both: the turn of the foot is given
+  std::vector<Eigen::Vector3d> turn;          // rotation vector, world; between the flat frames smoothly on and off
+  std::vector<Eigen::Vector3d> displacement;  // cm, world, of the ankle; zero where not planted
+};
+
+[[nodiscard]] FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& plants);
+
+// Values given at the frames that `known` marks, joined between: it leaves and meets them with their own speed, has no
+// acceleration there, and before the first and after the last eases to zero within half a second. Twice continuously
+// differentiable but for what the given values' own noise is.
+void join_between(const std::vector<char>& known, double rate_hz, std::vector<Eigen::Vector3d>& values);
+
+}  // namespace kinespace

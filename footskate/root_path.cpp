@@ -1,0 +1,129 @@
+#include "footskate/root_path.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseCore>
+
+namespace kinespace {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr double smooth_s = 0.12;
+constexpr double home = 0.05;      // weight of staying where the root was
+constexpr double along_leg = 8;    // weight of a leg's reach, where 1 is that of the ankle's place
+constexpr double stretched = 200;  // the same of a leg that would be too long
+constexpr double longest = 0.99;   // share of the leg
+
+// The quadratic form sum over frames of (u - a)' W (u - a), as W and W a.
+struct Pull {
+  Matrix3d weight = home * Matrix3d::Identity();
+  Vector3d moment = Vector3d::Zero();
+
+  void add(const Matrix3d& w, const Vector3d& wish) {
+    weight += w;
+    moment += w * wish;
+  }
+};
+
+// The minimum of the pulls and of smooth_s^6 |u'''|^2.
+std::vector<Vector3d> smoothest(const std::vector<Pull>& pulls, double rate_hz) {
+  const int frames = static_cast<int>(pulls.size());
+  std::vector<Eigen::Triplet<double>> entries;
+  entries.reserve(pulls.size() * (9 + 48));
+  Eigen::VectorXd right(3 * frames);
+  for (int f = 0; f < frames; ++f) {
+    right.segment<3>(3 * f) = pulls[f].moment;
+    for (int r = 0; r < 3; ++r) {
+      for (int c = 0; c < 3; ++c) entries.emplace_back(3 * f + r, 3 * f + c, pulls[f].weight(r, c));
+    }
+  }
+  const double stiff = std::pow(smooth_s * rate_hz, 6);
+  constexpr std::array<double, 4> third = {-1, 3, -3, 1};
+  for (int f = 0; f + 3 < frames; ++f) {
+    for (int a = 0; a < 4; ++a) {
+      for (int b = 0; b < 4; ++b) {
+        for (int c = 0; c < 3; ++c) {
+          entries.emplace_back(3 * (f + a) + c, 3 * (f + b) + c, stiff * third[a] * third[b]);
+        }
+      }
+    }
+  }
+  Eigen::SparseMatrix<double> matrix(3 * frames, 3 * frames);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> solver(matrix);
+  const Eigen::VectorXd u = solver.solve(right);
+  std::vector<Vector3d> out;
+  for (int f = 0; f < frames; ++f) out.emplace_back(u.segment<3>(3 * f));
+  return out;
+}
+
+class RootPath {
+ public:
+  RootPath(const FootTracks& tracks, const std::array<FootTask, 2>& tasks) : t_(tracks), tasks_(tasks) {
+    for (int leg = 0; leg < 2; ++leg) over_[leg].assign(t_.frames, 0);
+  }
+
+  std::vector<Vector3d> solve() {
+    constexpr int rounds = 10;
+    std::vector<Vector3d> u(t_.frames, Vector3d::Zero());
+    for (int round = 0; round < rounds; ++round) {
+      u = smoothest(pulls(u), t_.rate_hz);
+      if (!mark_stretched(u) && round > 0) break;
+    }
+    return u;
+  }
+
+ private:
+  [[nodiscard]] std::vector<Pull> pulls(const std::vector<Vector3d>& u) const {
+    std::vector<Pull> out(t_.frames);
+    for (int leg = 0; leg < 2; ++leg) {
+      for (int f = 0; f < t_.frames; ++f) {
+        if (tasks_[leg].planted[f] == 0) continue;
+        const Vector3d& wish = tasks_[leg].displacement[f];
+        const Vector3d way = goal(leg, f) - t_.hip[leg][f] - u[f];
+        const Vector3d along = way.normalized();
+        const Matrix3d axis = along * along.transpose();
+        out[f].add(Matrix3d::Identity() + along_leg * axis, wish);
+        // Of the way along the leg only so much as the leg may be long.
+        if (over_[leg][f] != 0) out[f].add(stretched * axis, u[f] + along * (way.norm() - limit(leg, f)));
+      }
+    }
+    return out;
+  }
+
+  // Marks the planted legs that are too long after the shift; whether there are new ones.
+  bool mark_stretched(const std::vector<Vector3d>& u) {
+    bool news = false;
+    for (int leg = 0; leg < 2; ++leg) {
+      for (int f = 0; f < t_.frames; ++f) {
+        if (tasks_[leg].planted[f] == 0 || over_[leg][f] != 0) continue;
+        if ((goal(leg, f) - t_.hip[leg][f] - u[f]).norm() <= limit(leg, f) + 1e-4) continue;
+        over_[leg][f] = 1;
+        news = true;
+      }
+    }
+    return news;
+  }
+
+  [[nodiscard]] Vector3d goal(int leg, int f) const { return t_.at[2 * leg][f] + tasks_[leg].displacement[f]; }
+  [[nodiscard]] double limit(int leg, int f) const {
+    const double length = (t_.knee[leg][f] - t_.hip[leg][f]).norm() + (t_.at[2 * leg][f] - t_.knee[leg][f]).norm();
+    return std::max(longest * length, (t_.at[2 * leg][f] - t_.hip[leg][f]).norm());
+  }
+
+  const FootTracks& t_;
+  const std::array<FootTask, 2>& tasks_;
+  std::array<std::vector<char>, 2> over_;
+};
+
+}  // namespace
+
+std::vector<Vector3d> root_shift(const FootTracks& tracks, const std::array<FootTask, 2>& tasks) {
+  return RootPath(tracks, tasks).solve();
+}
+
+}  // namespace kinespace
