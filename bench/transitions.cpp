@@ -1,5 +1,6 @@
 // `kinespace bench transitions`: connections against brute force and their cost, and the seams of transitions.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <random>
@@ -11,6 +12,7 @@
 #include "bench/bench_library.h"
 #include "bench/report.h"
 #include "synthesis/connection.h"
+#include "synthesis/transition.h"
 
 namespace kinespace {
 namespace {
@@ -74,14 +76,51 @@ void connection_rows(const std::string& data, LibraryView& view, BenchReport& re
                             .value = 1e3 * seconds / static_cast<double>(pairs.size()), .unit = "ms", .bar = 2});
 }
 
+double median(std::vector<double> values) {
+  std::ranges::nth_element(values, values.begin() + std::ssize(values) / 2);
+  return values[values.size() / 2];
+}
+
+void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) {
+  const std::int64_t space_id = view.library().spaces().front().id;
+  const ConnectionSpace space(view.space(space_id));
+  std::vector<ClipRow> rows;
+  for (const ClipRow& row : view.library().clips()) {
+    if (space.long_enough(static_cast<double>(row.frames - 1) / row.rate_hz)) rows.push_back(row);
+  }
+  std::vector<double> speed, acceleration;
+  for (const auto& [first, second] : random_pairs(rows.size(), 200)) {
+    const std::vector<ClipCurves> clips{view.curves(rows[first]), view.curves(rows[second])};
+    const Skeleton& skeleton = view.skeleton(rows[first].skeleton_id);
+    const Transition made = make_transition(space, clips, skeleton);
+    // Measured on what came out, not on what the search saw.
+    const JointRates of_first = joint_rates(clip_from_curves(clips[0], skeleton));
+    const JointRates of_second = joint_rates(clip_from_curves(clips[1], skeleton));
+    const std::array<const JointRates*, 2> sources{&of_first, &of_second};
+    const SeamRatios ratios = seam_ratios(joint_rates(made.clip), made.begin[0],
+                                          made.begin[0] + made.joins[0].duration_s, usual_rates(sources));
+    speed.push_back(ratios.speed);
+    acceleration.push_back(ratios.acceleration);
+  }
+  const auto row = [&](const char* name, double value, double bar) {
+    report.results.push_back({.name = name, .data = data, .value = value, .unit = "x", .bar = bar});
+  };
+  row("seam: largest joint speed over the usual, median of 200 random pairs", median(speed), 1);
+  row("seam: the same, worst", std::ranges::max(speed), 2);
+  row("seam: largest joint acceleration over the usual, median of 200 random pairs", median(acceleration), 1);
+  row("seam: the same, worst", std::ranges::max(acceleration), 2);
+}
+
 }  // namespace
 
 BenchReport bench_transitions(const BenchOptions& options) {
   BenchReport report{.bench = "transitions", .device = "processor", .threads = 1};
   BenchLibrary bandai({options.data / "bandai2"});
-  connection_rows("bandai2", bandai.view(), report);
+  if (!std::getenv("NOCONN")) connection_rows("bandai2", bandai.view(), report);
+  seam_rows("bandai2", bandai.view(), report);
   BenchLibrary cmu({options.data / "cmu"});
-  connection_rows("cmu", cmu.view(), report);
+  if (!std::getenv("NOCONN")) connection_rows("cmu", cmu.view(), report);
+  seam_rows("cmu", cmu.view(), report);
   return report;
 }
 
