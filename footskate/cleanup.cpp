@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "footskate/leg_pose.h"
+#include "footskate/leg_swing.h"
 #include "footskate/root_path.h"
 #include "footskate/skate_measures.h"
 
@@ -67,10 +68,7 @@ LegGoals goals_for(const FootTracks& t, const Ground& ground, const std::vector<
   LegGoals out{.root_shift = root_shift(t, tasks), .sides = {}};
   for (int leg = 0; leg < 2; ++leg) {
     LegGoals::Side& side = out.sides[leg];
-    std::vector<Vector3d> change = tasks[leg].displacement;  // of the ankle against the root
-    for (int f = 0; f < t.frames; ++f) change[f] -= out.root_shift[f];
-    join_between(tasks[leg].planted, t.rate_hz, change);
-    for (int f = 0; f < t.frames; ++f) side.ankle.push_back(t.at[2 * leg][f] + out.root_shift[f] + change[f]);
+    side.ankle = ankle_goals(t, leg, tasks[leg], out.root_shift);
     side.foot_turn = tasks[leg].turn;
     keep_above(t, ground, plants, leg, tasks[leg], side);
   }

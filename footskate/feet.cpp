@@ -66,16 +66,51 @@ double along(const Skeleton& s, const std::vector<int>& chain, std::size_t from,
   return sum;
 }
 
+// At most 50 frames of the clip, and the mean height of every joint in them: what the shape is judged by.
+struct Stance {
+  std::vector<double> height;
+  JointPositions positions;  // the frames looked at
+};
+
+Stance stance_of(const Clip& clip) {
+  constexpr int wanted = 50;
+  Stance out{.height = std::vector<double>(clip.skeleton.joints.size(), 0.0), .positions = {}};
+  out.positions.joints = clip.skeleton.joint_count();
+  std::vector<JointFrame> frame;
+  for (int i = 0; i < std::min(wanted, clip.frames); ++i) {
+    world_frames(clip, static_cast<int>(static_cast<std::int64_t>(i) * clip.frames / wanted) % clip.frames, frame);
+    for (std::size_t j = 0; j < frame.size(); ++j) {
+      out.height[j] += frame[j].position.y();
+      out.positions.values.push_back(frame[j].position);
+    }
+    ++out.positions.frames;
+  }
+  for (double& h : out.height) h /= out.positions.frames;
+  return out;
+}
+
+// Whether the bones between two joints of a chain (twist joints between them) lie on a line.
+bool straight(const Stance& stance, const std::vector<int>& chain, std::size_t from, std::size_t to, double length) {
+  if (to - from < 2) return true;
+  double sum = 0;
+  for (int f = 0; f < stance.positions.frames; ++f) {
+    sum += (stance.positions.at(f, chain[from]) - stance.positions.at(f, chain[to])).norm();
+  }
+  return sum >= 0.98 * length * stance.positions.frames;
+}
+
 // Hip and knee above an ankle: the shorter of thigh and shin as long as can be. No knee: the leg's hip is -1.
-Leg leg_above(const Skeleton& s, int ankle, int root) {
+Leg leg_above(const Skeleton& s, const Stance& stance, int ankle, int root) {
   const std::vector<int> chain = above(s, ankle, root);
   Leg out{.ankle = ankle};
   double best = 0;
   for (std::size_t hip = 2; hip < chain.size(); ++hip) {
     for (std::size_t knee = 1; knee < hip; ++knee) {
-      const double shorter = std::min(along(s, chain, 0, knee), along(s, chain, knee, hip));
-      if (shorter <= best * 1.02) continue;  // of equals the lowest
-      best = shorter;
+      const double shin = along(s, chain, 0, knee);
+      const double thigh = along(s, chain, knee, hip);
+      if (std::min(shin, thigh) <= best * 1.02) continue;  // of equals the lowest
+      if (!straight(stance, chain, 0, knee, shin) || !straight(stance, chain, knee, hip, thigh)) continue;
+      best = std::min(shin, thigh);
       out.knee = chain[knee];
       out.hip = chain[hip];
     }
@@ -115,41 +150,19 @@ bool mirrored(const Skeleton& s, const Leg& a, const Leg& b) {
   return a.hip != b.hip && a.knee != b.knee && near(la, lb) && near(bone(s, a.ankle), bone(s, b.ankle));
 }
 
-std::optional<Feet> by_name(const Skeleton& s) {
+std::optional<Feet> by_name(const Clip& clip, const Stance& stance) {
+  const Skeleton& s = clip.skeleton;
   const int root = s.travel_root();
   std::array<std::optional<Leg>, 2> found;
   for (int j = 0; j < s.joint_count(); ++j) {
     const std::string& name = s.joints[j].name;
     const int side = names_ankle(name) ? side_of(name) : -1;
     if (side < 0 || found[side]) continue;
-    const Leg leg = leg_above(s, j, root);
+    const Leg leg = leg_above(s, stance, j, root);
     if (leg.hip >= 0) found[side] = leg;
   }
-  if (!found[0] || !found[1] || !mirrored(s, *found[0], *found[1])) return std::nullopt;
+  if (!found[0] || !found[1] || found[0]->hip == found[1]->hip) return std::nullopt;
   return with_toes(s, *found[0], *found[1]);
-}
-
-// The mean height of every joint over at most 50 frames, and of the facing: what the shape is judged by.
-struct Stance {
-  std::vector<double> height;
-  JointPositions positions;  // the frames looked at
-};
-
-Stance stance_of(const Clip& clip) {
-  constexpr int wanted = 50;
-  Stance out{.height = std::vector<double>(clip.skeleton.joints.size(), 0.0), .positions = {}};
-  out.positions.joints = clip.skeleton.joint_count();
-  std::vector<JointFrame> frame;
-  for (int i = 0; i < std::min(wanted, clip.frames); ++i) {
-    world_frames(clip, static_cast<int>(static_cast<std::int64_t>(i) * clip.frames / wanted) % clip.frames, frame);
-    for (std::size_t j = 0; j < frame.size(); ++j) {
-      out.height[j] += frame[j].position.y();
-      out.positions.values.push_back(frame[j].position);
-    }
-    ++out.positions.frames;
-  }
-  for (double& h : out.height) h /= out.positions.frames;
-  return out;
 }
 
 // Whether `a` is the left leg: by name, else seen along the feet (or, without toes, along the bend of the knees).
@@ -172,14 +185,13 @@ bool is_left(const Skeleton& s, const Stance& stance, const Feet& feet) {
 }
 
 // The lowest mirrored pair of chains with two long bones each.
-std::optional<Feet> by_shape(const Clip& clip) {
+std::optional<Feet> by_shape(const Clip& clip, const Stance& stance) {
   const Skeleton& s = clip.skeleton;
   const int root = s.travel_root();
-  const Stance stance = stance_of(clip);
   const auto [low, high] = std::ranges::minmax(stance.height);
   std::vector<Leg> candidates;
   for (int j = 0; j < s.joint_count(); ++j) {
-    const Leg leg = leg_above(s, j, root);
+    const Leg leg = leg_above(s, stance, j, root);
     if (leg.hip < 0) continue;
     const double length = leg_length(s, leg);
     const double shin = along(s, above(s, j, leg.knee), 0, above(s, j, leg.knee).size());
@@ -206,7 +218,7 @@ std::optional<Feet> by_shape(const Clip& clip) {
   return best;
 }
 
-Leg named_leg(const Clip& clip, const std::string& name) {
+Leg named_leg(const Clip& clip, const Stance& stance, const std::string& name) {
   const int ankle = clip.skeleton.find(name);
   const char* remedy = "name the two ankle joints: --feet LEFT,RIGHT";
   if (ankle < 0) {
@@ -215,7 +227,7 @@ Leg named_leg(const Clip& clip, const std::string& name) {
                                        .expected = "the name of an ankle joint",
                                        .remedy = remedy});
   }
-  const Leg leg = leg_above(clip.skeleton, ankle, clip.skeleton.travel_root());
+  const Leg leg = leg_above(clip.skeleton, stance, ankle, clip.skeleton.travel_root());
   if (leg.hip < 0) {
     throw Error(ErrorKind::bad_input, {.file = clip.name,
                                        .found = fmt::format("no knee and hip above \"{}\"", name),
@@ -240,9 +252,12 @@ FeetNames FeetNames::parse(const std::string& text) {
 }
 
 std::optional<Feet> find_feet(const Clip& clip, const FeetNames& names) {
-  if (names.given()) return with_toes(clip.skeleton, named_leg(clip, names.left), named_leg(clip, names.right));
-  const std::optional<Feet> named = by_name(clip.skeleton);
-  return named ? named : by_shape(clip);
+  const Stance stance = stance_of(clip);
+  if (names.given()) {
+    return with_toes(clip.skeleton, named_leg(clip, stance, names.left), named_leg(clip, stance, names.right));
+  }
+  const std::optional<Feet> named = by_name(clip, stance);
+  return named ? named : by_shape(clip, stance);
 }
 
 Feet require_feet(const Clip& clip, const FeetNames& names) {

@@ -51,19 +51,36 @@ class Placer {
   void place_stance(std::size_t first) {
     plants_[first].place = own_place(plants_[first].contact);
     placed_[first] = 1;
-    std::vector<std::size_t> open = {first};
-    while (!open.empty()) {
-      const std::size_t from = open.back();
-      open.pop_back();
+    std::vector<std::size_t> stance = {first};
+    for (std::size_t next = 0; next < stance.size(); ++next) {
+      const std::size_t from = stance[next];
       for (std::size_t i = 0; i < plants_.size(); ++i) {
         const FootContact& a = plants_[from].contact;
         const FootContact& b = plants_[i].contact;
         if (placed_[i] != 0 || a.slot / 2 != b.slot / 2 || a.slot == b.slot || overlap(a, b) < 1) continue;
         plants_[i].place = plants_[from].place + mean_way(a, b);
         placed_[i] = 1;
-        open.push_back(i);
+        stance.push_back(i);
       }
     }
+    settle(stance);
+  }
+
+  // Sets a stance on the ground, by the longest stand of its lowest joint.
+  void settle(const std::vector<std::size_t>& stance) {
+    const auto lowest = [&](std::size_t i) {
+      const int slot = plants_[i].contact.slot;
+      return slot % 2 == 1 || !t_.has(slot + 1);
+    };
+    std::size_t base = plants_.size();
+    for (const std::size_t i : stance) {
+      const bool longer = base == plants_.size() || length(plants_[i].contact) > length(plants_[base].contact);
+      if (lowest(i) && longer) base = i;
+    }
+    if (base == plants_.size()) return;
+    const double above = plants_[base].place.y() - ground_.at(plants_[base].place);
+    if (ground_.kind == GroundKind::uneven || std::abs(above) > ground_band * t_.feet.leg_length_cm) return;
+    for (const std::size_t i : stance) plants_[i].place.y() -= above;
   }
 
   [[nodiscard]] Vector3d own_place(const FootContact& c) const {
@@ -72,10 +89,6 @@ class Placer {
     for (int f = c.first_frame; f <= c.last_frame; ++f) sum += path[f];
     Vector3d place = sum / length(c);
     place.y() = median_height(path, c);
-    const bool is_lowest = c.slot % 2 == 1 || !t_.has(c.slot + 1);
-    const bool level = ground_.kind != GroundKind::uneven;
-    const double above = place.y() - ground_.at(place);
-    if (is_lowest && level && std::abs(above) <= ground_band * t_.feet.leg_length_cm) place.y() -= above;
     return place;
   }
 

@@ -12,11 +12,12 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double smooth_s = 0.12;
+constexpr double smooth_s = 0.09;
 constexpr double home = 0.05;      // weight of staying where the root was
-constexpr double along_leg = 8;    // weight of a leg's reach, where 1 is that of the ankle's place
+constexpr double along_leg = 2;    // weight of a leg's reach, where 1 is that of the ankle's place
 constexpr double stretched = 200;  // the same of a leg that would be too long
-constexpr double longest = 0.99;   // share of the leg
+constexpr int rounds = 6;
+constexpr double longest = 0.99;  // share of the leg
 
 // The quadratic form sum over frames of (u - a)' W (u - a), as W and W a.
 struct Pull {
@@ -68,51 +69,54 @@ class RootPath {
   }
 
   std::vector<Vector3d> solve() {
-    constexpr int rounds = 10;
-    std::vector<Vector3d> u(t_.frames, Vector3d::Zero());
+    std::vector<Vector3d> shift(t_.frames, Vector3d::Zero());
     for (int round = 0; round < rounds; ++round) {
-      u = smoothest(pulls(u), t_.rate_hz);
-      if (!mark_stretched(u) && round > 0) break;
+      shift = smoothest(pulls(shift), t_.rate_hz);
+      mark_stretched(shift);
     }
-    return u;
+    return shift;
   }
 
  private:
-  [[nodiscard]] std::vector<Pull> pulls(const std::vector<Vector3d>& u) const {
+  [[nodiscard]] std::vector<Pull> pulls(const std::vector<Vector3d>& shift) const {
     std::vector<Pull> out(t_.frames);
     for (int leg = 0; leg < 2; ++leg) {
       for (int f = 0; f < t_.frames; ++f) {
         if (tasks_[leg].planted[f] == 0) continue;
-        const Vector3d& wish = tasks_[leg].displacement[f];
-        const Vector3d way = goal(leg, f) - t_.hip[leg][f] - u[f];
+        const Vector3d way = way_after(leg, f, shift);
         const Vector3d along = way.normalized();
         const Matrix3d axis = along * along.transpose();
-        out[f].add(Matrix3d::Identity() + along_leg * axis, wish);
-        // Of the way along the leg only so much as the leg may be long.
-        if (over_[leg][f] != 0) out[f].add(stretched * axis, u[f] + along * (way.norm() - limit(leg, f)));
+        const double keep = along_leg * straightness(leg, f);
+        out[f].add(Matrix3d::Identity(), tasks_[leg].displacement[f]);
+        out[f].add(keep * axis, shift[f] + along * (way.norm() - reach(leg, f)));
+        if (over_[leg][f] != 0) out[f].add(stretched * axis, shift[f] + along * (way.norm() - limit(leg, f)));
       }
     }
     return out;
   }
 
-  // Marks the planted legs that are too long after the shift; whether there are new ones.
-  bool mark_stretched(const std::vector<Vector3d>& u) {
-    bool news = false;
+  // Marks the legs that are too long after the shift.
+  void mark_stretched(const std::vector<Vector3d>& shift) {
     for (int leg = 0; leg < 2; ++leg) {
       for (int f = 0; f < t_.frames; ++f) {
-        if (tasks_[leg].planted[f] == 0 || over_[leg][f] != 0) continue;
-        if ((goal(leg, f) - t_.hip[leg][f] - u[f]).norm() <= limit(leg, f) + 1e-4) continue;
-        over_[leg][f] = 1;
-        news = true;
+        if (tasks_[leg].planted[f] != 0 && way_after(leg, f, shift).norm() > limit(leg, f) + 1e-4) over_[leg][f] = 1;
       }
     }
-    return news;
   }
 
-  [[nodiscard]] Vector3d goal(int leg, int f) const { return t_.at[2 * leg][f] + tasks_[leg].displacement[f]; }
-  [[nodiscard]] double limit(int leg, int f) const {
-    const double length = (t_.knee[leg][f] - t_.hip[leg][f]).norm() + (t_.at[2 * leg][f] - t_.knee[leg][f]).norm();
-    return std::max(longest * length, (t_.at[2 * leg][f] - t_.hip[leg][f]).norm());
+  // From hip to ankle.
+  [[nodiscard]] Vector3d way_after(int leg, int f, const std::vector<Vector3d>& shift) const {
+    return t_.at[2 * leg][f] + tasks_[leg].displacement[f] - t_.hip[leg][f] - shift[f];
+  }
+  [[nodiscard]] double length(int leg, int f) const {
+    return (t_.knee[leg][f] - t_.hip[leg][f]).norm() + (t_.at[2 * leg][f] - t_.knee[leg][f]).norm();
+  }
+  [[nodiscard]] double reach(int leg, int f) const { return (t_.at[2 * leg][f] - t_.hip[leg][f]).norm(); }
+  [[nodiscard]] double limit(int leg, int f) const { return std::max(longest * length(leg, f), reach(leg, f)); }
+  // By how much a change of the reach moves the knee, squared, against a leg bent at a right angle.
+  [[nodiscard]] double straightness(int leg, int f) const {
+    const double share = reach(leg, f) / length(leg, f);
+    return 1 / (1 - share * share + 0.01);
   }
 
   const FootTracks& t_;

@@ -11,15 +11,6 @@ using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-// The reach a leg takes for a wish.
-double soft_reach(double wish, double now, double length, double soft_from) {
-  const double longest = std::max(now, length * (1 - 1e-6));
-  const double soft = std::clamp(now, soft_from * length, longest);
-  if (wish <= soft) return wish;
-  const double room = longest - soft;
-  return room > 0 ? soft + room * (1 - std::exp(-(wish - soft) / room)) : soft;
-}
-
 // At right angles to the thigh, nearly that of the bend, and that of the hint where there is hardly a bend.
 Vector3d bending_axis(const TwoBoneLimb& limb, const Vector3d& thigh, const Vector3d& hint) {
   constexpr double straight = 0.05;  // sine of about 3 degrees
@@ -39,6 +30,14 @@ double knee_turn(const Vector3d& thigh, const Vector3d& shin, const Vector3d& ax
 }
 
 }  // namespace
+
+double soft_reach(double wish, double now, double length, double soft_from) {
+  const double longest = std::max(now, length * (1 - 1e-6));
+  const double soft = std::clamp(now, soft_from * length, longest);
+  if (wish <= soft) return wish;
+  const double room = longest - soft;
+  return room > 0 ? soft + room * (1 - std::exp(-(wish - soft) / room)) : soft;
+}
 
 Vector3d knee_bend(const TwoBoneLimb& limb) {
   return (limb.knee - limb.hip).normalized().cross((limb.ankle - limb.knee).normalized());

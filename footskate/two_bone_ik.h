@@ -41,6 +41,9 @@ struct TwoBoneTurn {
 // The axis about which the knee bends: thigh x shin, of length sin(bend).
 [[nodiscard]] Eigen::Vector3d knee_bend(const TwoBoneLimb& limb);
 
+// The reach a leg of `length` takes that now reaches `now`, for a wish: soft as above.
+[[nodiscard]] double soft_reach(double wish, double now, double length, double soft_from = 0.99);
+
 // Both bones must have a length.
 [[nodiscard]] TwoBoneTurn reach_for(const TwoBoneLimb& limb, const Eigen::Vector3d& target,
                                     const TwoBoneOptions& options = {});
