@@ -8,6 +8,7 @@
 #include "cli/json_output.h"
 #include "motion/read.h"
 #include "synthesis/retrieval.h"
+#include "synthesis/windows.h"
 
 namespace kinespace::cli {
 namespace {
@@ -17,6 +18,9 @@ struct QueryCommandOptions {
   std::string clip;
   QueryOptions query;
   bool no_rerank = false;
+  bool windows = false;
+  TimeRange range;
+  bool overlapping = false;
   std::string device = "auto";
   bool json = false;
 };
@@ -39,14 +43,22 @@ void print_matches(const std::vector<Match>& matches) {
     fmt::print("no match\n");
     return;
   }
-  fmt::print("{:>10}  {:>8}  clip\n", "distance", "seconds");
+  fmt::print("{:>10}  {:>8}  {:>8}  clip\n", "distance", "from s", "to s");
   for (const Match& match : matches)
-    fmt::print("{:>10.5f}  {:>8.2f}  {}\n", match.distance, match.end_s - match.start_s, match.clip);
+    fmt::print("{:>10.5f}  {:>8.2f}  {:>8.2f}  {}\n", match.distance, match.start_s, match.end_s, match.clip);
 }
 
 // A file where there is one of that name and a clip reader for it, else a clip of the library.
 bool is_file(const std::string& text) {
   return is_motion_file(text) && std::filesystem::exists(text);
+}
+
+std::vector<Match> nearest(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
+                           const QueryCommandOptions& options, const std::string& except, const Compute& compute) {
+  if (!options.windows) return nearest_motions(library, curves, skeleton, options.query, except, compute);
+  return nearest_windows(library, curves, skeleton, options.range,
+                         {.k = options.query.k, .overlapping = options.overlapping, .labels = options.query.labels},
+                         {.weighted = options.query.weighted}, except);
 }
 
 std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute) {
@@ -59,11 +71,10 @@ std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options
                    .expected = "the joint names, parents and channels of its clips",
                    .remedy = "kinespace build --add --by-skeleton adds clips of another skeleton"});
     }
-    return nearest_motions(library, clip, options.query, {}, compute);
+    return nearest(library, clip_curves(clip), clip.skeleton, options, {}, compute);
   }
   const ClipRow row = library.require_clip(options.clip);
-  return nearest_motions(library, library.curves(row), library.skeleton(row.skeleton_id), options.query, row.name,
-                         compute);
+  return nearest(library, library.curves(row), library.skeleton(row.skeleton_id), options, row.name, compute);
 }
 
 void run_query(QueryCommandOptions options) {
@@ -87,6 +98,14 @@ void add_query(CLI::App& app, Session& /*session*/) {
       ->capture_default_str();
   command->add_flag("--weighted", options->query.weighted, "Joint weights in the vector distance");
   command->add_option("--label", options->query.labels, "Only clips with this label; may be given again");
+  auto* windows =
+      command->add_flag("--windows", options->windows, "Look for a window of the clip inside the library's clips");
+  command->add_option("--from", options->range.from_s, "Where the window starts, in seconds")
+      ->capture_default_str()
+      ->needs(windows);
+  command->add_option("--to", options->range.to_s, "Where it ends; a second later unless given")->needs(windows);
+  command->add_flag("--overlapping", options->overlapping, "Also windows that overlap a nearer one in the same clip")
+      ->needs(windows);
   command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
   command->add_flag("--json", options->json, "Print the matches as one JSON object");
   command->callback([options] { run_query(*options); });

@@ -54,6 +54,7 @@ class WindowSpace {
                                        const Eigen::Matrix4Xd& references, const WindowOptions& options = {});
 
   [[nodiscard]] const WindowOptions& options() const { return options_; }
+  [[nodiscard]] int curves() const { return static_cast<int>(scale_.size()); }
   [[nodiscard]] int dimensions() const { return static_cast<int>(components_.cols()); }
 
   // One row for each window of the stretch: row i starts at sample i.
