@@ -56,6 +56,7 @@ struct Bench {
 [[nodiscard]] BenchReport bench_io(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_kernels(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_retrieval(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_search(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_transitions(const BenchOptions& options);
 
 }  // namespace kinespace
