@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/error.h"
+#include "fpca/cut_join.h"
 
 namespace kinespace {
 namespace {
@@ -52,64 +53,15 @@ SampleMatrix decode_frames(const MotionSpace& space, const EncodedSequence& sequ
   return out;
 }
 
-// The correction's shape over the distance x (in fractions of the sequence) from the cut: `value` is 1 at the cut with
-// no slope, `slope` is 0 there and rises at once; both vanish smoothly at x = blend.
-struct Fade {
-  double value = 0;
-  double slope = 0;
-};
-
-Fade fade(double x, double blend) {
-  const double u = 1 - x / blend;
-  if (u <= 0) return {};
-  const double u3 = u * u * u;
-  return {u3 * (10 - 15 * u + 6 * u * u), (1 - u) * u3 * (1 + 3 * (1 - u))};
-}
-
-// Typical change of slope from frame to frame inside a sequence, by curve.
-Eigen::RowVectorXd typical_change(const SampleMatrix& frames) {
-  if (frames.rows() < 3) return Eigen::RowVectorXd::Zero(frames.cols());
-  const Eigen::Index n = frames.rows() - 2;
-  return ((frames.topRows(n) - 2 * frames.middleRows(1, n) + frames.bottomRows(n)).colwise().squaredNorm() /
-          static_cast<double>(n))
-      .cwiseSqrt();
-}
-
-// The part of `change` beyond +- `allowed`.
-Eigen::RowVectorXd excess(const Eigen::RowVectorXd& change, const Eigen::RowVectorXd& allowed) {
-  return (change.array().abs() - allowed.array()).max(0.0) * change.array().sign();
-}
-
-// What both neighbours of a cut must give up, in values and in slopes (per frame).
-struct CutCorrection {
-  Eigen::RowVectorXd value;  // to add on the left; the right adds the negative
-  Eigen::RowVectorXd slope;
-};
-
-CutCorrection correction_at(const SampleMatrix& left, const SampleMatrix& right, double free_change) {
-  const Eigen::Index n = left.rows() - 1;
-  CutCorrection out;
-  out.value = (right.row(0) - left.row(n)) / 2;
-  out.slope = Eigen::RowVectorXd::Zero(left.cols());
-  if (n >= 1 && right.rows() >= 2) {
-    const Eigen::RowVectorXd change = (right.row(1) - right.row(0)) - (left.row(n) - left.row(n - 1));
-    const Eigen::RowVectorXd allowed = free_change * (typical_change(left) + typical_change(right)) / 2;
-    out.slope = excess(change, allowed) / 2;
-  }
-  return out;
-}
-
 void join(std::vector<DecodedSequence>& sequences, const JoinOptions& options) {
   std::vector<CutCorrection> cuts;
   for (std::size_t i = 0; i + 1 < sequences.size(); ++i) {
-    cuts.push_back(correction_at(sequences[i].frames, sequences[i + 1].frames, options.free_change));
+    cuts.push_back(cut_correction(sequences[i].frames, sequences[i + 1].frames, options.free_change));
   }
   for (std::size_t i = 0; i < sequences.size(); ++i) {
     SampleMatrix& frames = sequences[i].frames;
     const auto n = static_cast<double>(frames.rows() - 1);
-    // A slope of 1 per frame at the cut means 1 at the first frame beside it.
-    const double first = n > 0 ? fade(1 / n, options.blend).slope : 0;
-    const double steepness = first > 0 ? 1 / first : 0;
+    const double steepness = fade_steepness(n, options.blend);
     for (Eigen::Index f = 0; f < frames.rows(); ++f) {
       if (i > 0) {
         const Fade w = fade(static_cast<double>(f) / n, options.blend);
