@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "footskate/contact_model.h"
 #include "footskate/leg_pose.h"
 #include "footskate/leg_swing.h"
 #include "footskate/root_path.h"
@@ -81,7 +82,7 @@ Ground ground_for(const FootTracks& tracks, const CleanOptions& options) {
 
 FootContacts contacts_for(const FootTracks& tracks, const Ground& ground, const CleanOptions& options) {
   if (options.contacts) return *options.contacts;
-  return contacts_by_rule(tracks, ground);
+  return (options.model != nullptr ? *options.model : ContactModel::standard()).detect(tracks, ground);
 }
 
 void check_contacts(const Clip& clip, const FootTracks& tracks, const FootContacts& contacts) {

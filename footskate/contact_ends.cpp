@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "footskate/contacts.h"
 
@@ -40,31 +41,68 @@ class EndFitter {
 
   // The end in the direction `step`, -1 or 1.
   [[nodiscard]] int end(int step) const {
-    const int length = contact_.last_frame - contact_.first_frame + 1;
-    const int inset = std::min(length / 6, static_cast<int>(0.05 * tracks_.rate_hz));
-    const int window = std::clamp(static_cast<int>(0.2 * tracks_.rate_hz), 3, std::max(3, length - 2 * inset));
-    const int from = step > 0 ? contact_.last_frame - inset : contact_.first_frame + inset;
-    const int back = std::clamp(from - step * (window - 1), contact_.first_frame, contact_.last_frame);
-    const Slide slide = fit_slide(path_, std::min(from, back), std::max(from, back));
+    const Window best = stillest(step);
     const int beyond = static_cast<int>(std::lround(0.1 * tracks_.rate_hz));
     const int limit =
         std::clamp((step > 0 ? contact_.last_frame : contact_.first_frame) + step * beyond, 0, tracks_.frames - 1);
+    const int from = step > 0 ? best.last : best.first;
     int f = from;
-    while (f != limit && keeps(slide, f + step, std::abs(f + step - from))) f += step;
+    while (f != limit && keeps(best.slide, f + step, std::abs(f + step - from))) f += step;
     return f;
   }
 
  private:
+  struct Window {
+    int first;
+    int last;
+    Slide slide;
+  };
+
+  // Of windows from the end inwards to the middle of the contact the one in which the joint strays least: near the end
+  // it may be leaving already.
+  [[nodiscard]] Window stillest(int step) const {
+    const int length = contact_.last_frame - contact_.first_frame + 1;
+    const int most = std::min(length, std::max(3, length / 2));
+    const int span = std::clamp(static_cast<int>(0.2 * tracks_.rate_hz), std::min(3, length), most);
+    const int reach = std::min(length - span, std::max(length / 4, static_cast<int>(0.1 * tracks_.rate_hz)));
+    Window best{};
+    double least = std::numeric_limits<double>::infinity();
+    for (int inset = 0; inset <= reach; ++inset) {
+      const int first = step > 0 ? contact_.last_frame - inset - span + 1 : contact_.first_frame + inset;
+      const Slide slide = fit_slide(path_, first, first + span - 1);
+      if (slide.stray >= 0.8 * least) continue;  // clearly stiller than one that is nearer to the end
+      least = slide.stray;
+      best = {first, first + span - 1, slide};
+    }
+    return best;
+  }
+
   [[nodiscard]] bool keeps(const Slide& slide, int frame, int distance) const {
     const double length = tracks_.feet.leg_length_cm;
     const double near = std::clamp(4 * slide.stray, 0.00004 * length, 0.006 * length);
-    return (path_[frame] - slide.at(frame)).norm() <= near + 0.15 * slide.speed.norm() * distance;
+    if ((path_[frame] - slide.at(frame)).norm() <= near + 0.15 * slide.speed.norm() * distance) return true;
+    return tracks_.velocity(path_, frame).norm() <= 0.005 * length;
   }
 
   const FootTracks& tracks_;
   const Path& path_;
   FootContact contact_;
 };
+
+// Joins contacts with less than 80 ms between them in which the joint hardly leaves its place.
+void join_near(const FootTracks& tracks, const Path& path, std::vector<char>& planted) {
+  const double near = 0.012 * tracks.feet.leg_length_cm;
+  for (int f = 1; f < tracks.frames; ++f) {
+    if (planted[f] != 0 || planted[f - 1] == 0) continue;
+    int next = f;
+    while (next < tracks.frames && planted[next] == 0) ++next;
+    if (next == tracks.frames) return;
+    bool stays = next - f <= 0.08 * tracks.rate_hz;
+    for (int i = f; i <= next; ++i) stays = stays && (path[i] - path[f - 1]).norm() <= near;
+    if (stays) std::fill(planted.begin() + f, planted.begin() + next, 1);
+    f = next;
+  }
+}
 
 }  // namespace
 
@@ -80,6 +118,7 @@ FootContacts fit_ends(const FootTracks& tracks, const FootContacts& contacts) {
       if (last - first < 0.05 * tracks.rate_hz - 1e-9) continue;
       std::fill(planted.begin() + first, planted.begin() + last + 1, 1);
     }
+    join_near(tracks, tracks.at[slot], planted);
     append_runs(planted, slot, out);
   }
   return out;

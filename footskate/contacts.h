@@ -25,19 +25,15 @@ struct FootContact {
 // By slot, then by time; contacts of one slot do not touch.
 using FootContacts = std::vector<FootContact>;
 
-// The rule of height and speed: a rest (footskate/ground.h) whose height over the ground is that of a standing foot
-// within 5 % of the leg length. On uneven ground any height will do if, at some time in the rest, the other foot has
-// none: then it bears the body, and is not a foot held still in the air.
+// The rule of height and speed: every rest that bears the body (footskate/ground.h, bearing_rests), its ends fitted.
 [[nodiscard]] FootContacts contacts_by_rule(const FootTracks& tracks, const Ground& ground);
 
-// The height of each slot over the ground while its foot stands flat, cm: the median over rests; 0 for toes. Ankles of
-// a foot without toes: 0.
-[[nodiscard]] std::array<double, 4> standing_heights(const FootTracks& tracks, const Ground& ground);
-
-// Moves the ends of contacts to where the joint leaves its place: a line is fitted to the last 0.2 s within the end (a
-// constant for the height), and the contact reaches as far as the joint keeps to it. How near it must keep is 4 times
-// what it strays within, at least 0.00004 and at most 0.006 leg lengths, and 15 % of the way it has slid since. An end
-// moves out by 0.1 s at most. Contacts of a slot that meet are joined; those under 50 ms are dropped.
+// Moves the ends of contacts to where the joint leaves its place: a line (a constant for the height) is fitted to the
+// stillest 0.2 s on this side of the middle, and the contact reaches as far as the joint keeps to it. How near it must
+// keep is 4 times what it strays there, at least 0.00004 and at most 0.006 leg lengths, and 15 % of the way it has slid
+// since; or it must be slower than 0.005 leg lengths a second. An end moves out by 0.1 s at most. Contacts under 50 ms
+// are dropped; those of a slot with less than 80 ms between them, in which the joint stays within 1.2 % of the leg
+// length, are joined.
 [[nodiscard]] FootContacts fit_ends(const FootTracks& tracks, const FootContacts& contacts);
 
 // Whether each frame of a slot is in one of the contacts.

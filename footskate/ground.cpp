@@ -153,6 +153,27 @@ double lowest_level(std::vector<Rest> rests, double band) {
   return heaviest_level(rests, band).height;
 }
 
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+// Whether any joint of a leg rests at each frame.
+std::vector<char> resting(const std::vector<Rest>& rests, int leg, int frames) {
+  std::vector<char> out(frames, 0);
+  for (const Rest& r : rests) {
+    if (r.slot / 2 == leg) std::fill(out.begin() + r.first_frame, out.begin() + r.last_frame + 1, 1);
+  }
+  return out;
+}
+
+bool bears_alone(const Rest& rest, const std::vector<char>& other_rests) {
+  return std::any_of(other_rests.begin() + rest.first_frame, other_rests.begin() + rest.last_frame + 1,
+                     [](char rests) { return rests == 0; });
+}
+
 }  // namespace
 
 std::string_view to_string(GroundKind kind) {
@@ -173,6 +194,38 @@ std::vector<Rest> find_rests(const FootTracks& tracks) {
     if (tracks.has(slot)) rests_of(tracks, slot, out);
   }
   return out;
+}
+
+std::array<double, 4> standing_heights(const FootTracks& tracks, const Ground& ground) {
+  std::array<double, 4> out{};
+  const std::vector<Rest> rests = find_rests(tracks);
+  for (int slot = 0; slot < 4; slot += 2) {
+    if (!tracks.has(slot + 1)) continue;
+    std::vector<double> heights;
+    for (const Rest& r : rests) {
+      if (r.slot != slot) continue;
+      for (int f = r.first_frame; f <= r.last_frame; ++f) {
+        const double toe = tracks.at[slot + 1][f].y();
+        const double level = ground.kind == GroundKind::uneven ? toe : ground.at(tracks.at[slot][f]);
+        heights.push_back(tracks.at[slot][f].y() - level);
+      }
+    }
+    out[slot] = median(std::move(heights));
+  }
+  return out;
+}
+
+std::vector<Rest> bearing_rests(const FootTracks& tracks, const Ground& ground) {
+  const double band = 0.05 * tracks.feet.leg_length_cm;
+  const auto stand = standing_heights(tracks, ground);
+  std::vector<Rest> rests = find_rests(tracks);
+  const std::array<std::vector<char>, 2> leg_rests = {resting(rests, 0, tracks.frames),
+                                                      resting(rests, 1, tracks.frames)};
+  std::erase_if(rests, [&](const Rest& r) {
+    if (ground.kind == GroundKind::uneven) return !bears_alone(r, leg_rests[1 - r.slot / 2]);
+    return std::abs(r.place.y() - ground.at(r.place) - stand[r.slot]) > band;
+  });
+  return rests;
 }
 
 Ground estimate_ground(const FootTracks& tracks) {

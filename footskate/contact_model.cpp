@@ -1,0 +1,130 @@
+#include "footskate/contact_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace kinespace {
+namespace {
+
+constexpr std::size_t neighbours = 5;
+constexpr float unlike_anything = 0.5F;  // leg lengths: no labelled keyframe within it
+
+// The distance of the nearest keyframe and the share of the nearest ones in which ankle and toe stand.
+struct Vote {
+  float distance = std::numeric_limits<float>::infinity();
+  std::array<double, 2> share{};
+};
+
+Vote vote(const std::vector<LabelledKeyframe>& keyframes, const Keyframe& query) {
+  std::array<float, neighbours> nearest;
+  std::array<std::uint8_t, neighbours> planted{};
+  nearest.fill(std::numeric_limits<float>::infinity());
+  for (const LabelledKeyframe& k : keyframes) {
+    const float d = squared_distance(k.keyframe, query);
+    if (d >= nearest.back()) continue;
+    std::size_t at = neighbours - 1;
+    for (; at > 0 && nearest[at - 1] > d; --at) {
+      nearest[at] = nearest[at - 1];
+      planted[at] = planted[at - 1];
+    }
+    nearest[at] = d;
+    planted[at] = k.planted;
+  }
+  Vote out{.distance = std::sqrt(nearest.front())};
+  double all = 0;
+  for (std::size_t i = 0; i < std::min(neighbours, keyframes.size()); ++i) {
+    const double weight = 1 / (nearest[i] + 4e-4);
+    all += weight;
+    for (std::size_t joint = 0; joint < 2; ++joint) out.share[joint] += ((planted[i] >> joint) & 1U) != 0 ? weight : 0;
+  }
+  for (double& share : out.share) share /= std::max(all, 1e-300);
+  return out;
+}
+
+// Whether a joint may stand at a frame at all.
+class Plausible {
+ public:
+  Plausible(const FootTracks& tracks, const Ground& ground)
+      : t_(tracks),
+        level_{levels_under(tracks, ground, 0), levels_under(tracks, ground, 1)},
+        stand_(standing_heights(tracks, ground)) {}
+
+  [[nodiscard]] bool operator()(int slot, int f) const {
+    const double length = t_.feet.leg_length_cm;
+    const double height = t_.at[slot][f].y() - level_[slot / 2][f] - stand_[slot];
+    const Eigen::Vector3d v = t_.velocity(t_.at[slot], f);
+    const Eigen::Vector3d root = t_.velocity(t_.root, f);
+    const double allowed = 0.5 * length + 0.5 * std::hypot(root.x(), root.z());
+    return std::abs(height) <= 0.08 * length && std::hypot(v.x(), v.z()) <= allowed;
+  }
+
+ private:
+  const FootTracks& t_;
+  std::array<std::vector<double>, 2> level_;
+  std::array<double, 4> stand_;
+};
+
+}  // namespace
+
+FootContacts ContactModel::detect(const FootTracks& tracks, const Ground& ground) const {
+  const FootContacts by_rule = contacts_by_rule(tracks, ground);
+  const Plausible plausible(tracks, ground);
+  FootContacts found;
+  for (int leg = 0; leg < 2; ++leg) {
+    std::array<std::vector<char>, 2> planted = {planted_frames(by_rule, 2 * leg, tracks.frames),
+                                                planted_frames(by_rule, 2 * leg + 1, tracks.frames)};
+    const std::vector<Keyframe> queries = keyframes_of(tracks, ground, leg);
+    for (std::size_t f = 0; f < queries.size(); ++f) {
+      const Vote v = vote(keyframes_, queries[f]);
+      if (v.distance > unlike_anything) continue;
+      for (int joint = 0; joint < 2; ++joint) {
+        planted[joint][f] = v.share[joint] >= 0.5 && plausible(2 * leg + joint, static_cast<int>(f)) ? 1 : 0;
+      }
+    }
+    for (int joint = 0; joint < 2; ++joint) append_runs(planted[joint], 2 * leg + joint, found);
+  }
+  return fit_ends(tracks, found);
+}
+
+std::vector<double> ContactModel::distances(const FootTracks& tracks, const Ground& ground) const {
+  std::vector<double> out(tracks.frames, keyframes_.empty() ? std::numeric_limits<double>::infinity() : 0.0);
+  for (int leg = 0; leg < 2; ++leg) {
+    const std::vector<Keyframe> queries = keyframes_of(tracks, ground, leg);
+    for (std::size_t f = 0; f < queries.size(); ++f) {
+      out[f] = std::max(out[f], static_cast<double>(vote(keyframes_, queries[f]).distance));
+    }
+  }
+  return out;
+}
+
+ContactModel ContactModel::train(std::span<const LabelledClip> clips, double apart) {
+  const auto limit = static_cast<float>(apart * apart);
+  std::vector<LabelledKeyframe> kept;
+  for (const LabelledClip& labelled : clips) {
+    const FootTracks tracks = foot_tracks(labelled.clip, require_feet(labelled.clip, labelled.feet));
+    const Ground ground = estimate_ground(tracks);
+    for (int leg = 0; leg < 2; ++leg) {
+      const std::vector<Keyframe> all = keyframes_of(tracks, ground, leg);
+      const auto ankle = planted_frames(labelled.contacts, 2 * leg, tracks.frames);
+      const auto toe = planted_frames(labelled.contacts, 2 * leg + 1, tracks.frames);
+      for (std::size_t f = 0; f < all.size(); ++f) {
+        const auto planted = static_cast<std::uint8_t>((ankle[f] != 0 ? 1 : 0) | (toe[f] != 0 ? 2 : 0));
+        const bool known = std::ranges::any_of(kept, [&](const LabelledKeyframe& k) {
+          return k.planted == planted && squared_distance(k.keyframe, all[f]) < limit;
+        });
+        if (!known) kept.push_back({all[f], planted});
+      }
+    }
+  }
+  return ContactModel(std::move(kept));
+}
+
+ContactModel ContactModel::with(const ContactModel& more) const {
+  std::vector<LabelledKeyframe> all = keyframes_;
+  all.insert(all.end(), more.keyframes_.begin(), more.keyframes_.end());
+  return ContactModel(std::move(all));
+}
+
+}  // namespace kinespace
