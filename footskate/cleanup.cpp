@@ -19,59 +19,32 @@ using Eigen::Vector3d;
 
 constexpr double settled_cm = 0.05;  // a pass that moves nothing by more is not needed
 
-// The levels that the foot of a leg may not go below, one a frame: the ground; uneven: the lower of the plants before
-// and after.
-std::vector<double> levels(const FootTracks& t, const Ground& ground, const std::vector<Plant>& plants, int leg) {
-  std::vector<double> out(t.frames, ground.height_cm);
-  if (ground.kind != GroundKind::uneven) return out;
-  std::vector<double> stand(t.frames, std::nan(""));
-  const int slot = t.has(2 * leg + 1) ? 2 * leg + 1 : 2 * leg;
-  for (const Plant& p : plants) {
-    if (p.contact.slot != slot) continue;
-    std::fill(stand.begin() + p.contact.first_frame, stand.begin() + p.contact.last_frame + 1, p.place.y());
-  }
-  std::vector<double> before = stand;
-  for (int f = 1; f < t.frames; ++f) {
-    if (std::isnan(before[f])) before[f] = before[f - 1];
-  }
-  for (int f = t.frames - 2; f >= 0; --f) {
-    if (std::isnan(stand[f])) stand[f] = stand[f + 1];
-  }
-  for (int f = 0; f < t.frames; ++f) {
-    const double low = std::fmin(before[f], stand[f]);
-    out[f] = std::isnan(low) ? ground.height_cm : low;
-  }
-  return out;
-}
-
 // Lifts the ankle's goals where ankle or toe would be under the ground.
-void keep_above(const FootTracks& t, const Ground& ground, const std::vector<Plant>& plants, int leg,
-                const FootTask& task, LegGoals::Side& goals) {
-  const std::vector<double> level = levels(t, ground, plants, leg);
+void keep_above(const FootTracks& t, const FloorUnder& floor, int leg, const FootTask& task, LegGoals::Side& goals) {
   for (int f = 0; f < t.frames; ++f) {
     if (task.planted[f] != 0) continue;
-    const auto floor_at = [&](const Vector3d& p) { return ground.kind == GroundKind::slope ? ground.at(p) : level[f]; };
     const Vector3d ankle = goals.ankle[f];
-    double lift = floor_at(ankle) - ankle.y();
+    double lift = floor.at(ankle, f) - ankle.y();
     if (t.has(2 * leg + 1)) {
       Vector3d way = t.at[2 * leg + 1][f] - t.at[2 * leg][f];
       const double angle = goals.foot_turn[f].norm();
       if (angle > 0) way = Eigen::AngleAxisd(angle, goals.foot_turn[f] / angle) * way;
       const Vector3d toe = ankle + way;
-      lift = std::max(lift, floor_at(toe) - toe.y());
+      lift = std::max(lift, floor.at(toe, f) - toe.y());
     }
     if (lift > 0) goals.ankle[f].y() += lift;
   }
 }
 
 LegGoals goals_for(const FootTracks& t, const Ground& ground, const std::vector<Plant>& plants) {
-  const std::array<FootTask, 2> tasks = {foot_task(t, 0, plants), foot_task(t, 1, plants)};
+  const std::array<FloorUnder, 2> floors = {FloorUnder(t, ground, plants, 0), FloorUnder(t, ground, plants, 1)};
+  const std::array<FootTask, 2> tasks = {foot_task(t, 0, plants, floors[0]), foot_task(t, 1, plants, floors[1])};
   LegGoals out{.root_shift = root_shift(t, tasks), .sides = {}};
   for (int leg = 0; leg < 2; ++leg) {
     LegGoals::Side& side = out.sides[leg];
     side.ankle = ankle_goals(t, leg, tasks[leg], out.root_shift);
     side.foot_turn = tasks[leg].turn;
-    keep_above(t, ground, plants, leg, tasks[leg], side);
+    keep_above(t, floors[leg], leg, tasks[leg], side);
   }
   return out;
 }
@@ -103,7 +76,15 @@ void measure(const Clip& before, const FootTracks& tracks, const FootContacts& c
   const FootTracks after = foot_tracks(result.clip, report.feet);
   report.foot_slide_before_cm_s = foot_slide_cm_s(tracks, contacts);
   report.foot_slide_after_cm_s = foot_slide_cm_s(after, contacts);
-  report.floor_penetration_cm = floor_penetration_cm(after, report.ground);
+  for (int leg = 0; leg < 2; ++leg) {
+    const FloorUnder floor(after, report.ground, report.plants, leg);
+    for (int slot = 2 * leg; slot < 2 * leg + 2; ++slot) {
+      for (int f = 0; f < after.frames && after.has(slot); ++f) {
+        const Vector3d& p = after.at[slot][f];
+        report.floor_penetration_cm = std::max(report.floor_penetration_cm, floor.at(p, f) - p.y());
+      }
+    }
+  }
   report.mean_pose_change_cm = mean_pose_change_cm(before, result.clip);
   report.largest_move_cm = largest_move_cm(before, result.clip);
   const double was = largest_acceleration_cm_s2(before);
@@ -120,7 +101,7 @@ void CleanOptions::validate() const {
         {.found = fmt::format("{} = {}", field, value), .expected = fmt::format("{} to {}", low, high), .remedy = {}});
   };
   if (floor_cm) require("floor_cm", *floor_cm, -1e5, 1e5);
-  require("passes", passes, 1, 10);
+  require("passes", passes, 1, 20);
 }
 
 CleanResult clean(const Clip& clip, const CleanOptions& options) {

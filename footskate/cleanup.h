@@ -28,7 +28,7 @@ struct CleanOptions {
   std::optional<double> floor_cm;        // the ground is flat at this height, -1e5 to 1e5; none: estimated
   std::optional<FootContacts> contacts;  // these and no others; none: detected
   const ContactModel* model = nullptr;   // detects them; null: the model that comes with the library
-  int passes = 4;                        // 1 to 10
+  int passes = 8;                        // 1 to 20
   void validate() const;                 // throws Error{usage} naming field, value and range
 };
 
@@ -38,10 +38,11 @@ struct CleanReport {
   std::vector<Plant> plants;          // those of the last pass that changed something
   double foot_slide_before_cm_s = 0;  // over the contacts found in the input
   double foot_slide_after_cm_s = 0;   // over the same frames
-  double floor_penetration_cm = 0;    // after; under uneven ground's lowest level
-  double mean_pose_change_cm = 0;     // footskate/skate_measures.h
-  double largest_move_cm = 0;         // of any joint, world
-  double acceleration_ratio = 1;      // the largest of any joint, after over before; 1 where nothing moves
+  double floor_penetration_cm =
+      0;  // after: the deepest joint; uneven ground: below the lower of its plants before and after
+  double mean_pose_change_cm = 0;  // footskate/skate_measures.h
+  double largest_move_cm = 0;      // of any joint, world
+  double acceleration_ratio = 1;   // the largest of any joint, after over before; 1 where nothing moves
   int passes = 0;
 };
 

@@ -12,7 +12,8 @@ struct Slide {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // cm, at `centre`
   Eigen::Vector3d speed = Eigen::Vector3d::Zero();  // cm a frame
   double centre = 0;                                // frame
-  double stray = 0;                                 // cm: root mean square of what is left
+  double stray = 0;                                 // cm: root mean square of what is left, across
+  double bob = 0;                                   // the same up and down
 
   [[nodiscard]] Eigen::Vector3d at(double frame) const { return place + speed * (frame - centre); }
 };
@@ -29,8 +30,14 @@ Slide fit_slide(const Path& path, int first, int last) {
   out.speed *= count >= 4 ? 1 / squares : 0;
   out.speed.y() = 0;
   double sum = 0;
-  for (int f = first; f <= last; ++f) sum += (path[f] - out.at(f)).squaredNorm();
+  double upright = 0;
+  for (int f = first; f <= last; ++f) {
+    const Eigen::Vector3d off = path[f] - out.at(f);
+    sum += off.x() * off.x() + off.z() * off.z();
+    upright += off.y() * off.y();
+  }
   out.stray = std::sqrt(sum / count);
+  out.bob = std::sqrt(upright / count);
   return out;
 }
 
@@ -47,7 +54,7 @@ class EndFitter {
         std::clamp((step > 0 ? contact_.last_frame : contact_.first_frame) + step * beyond, 0, tracks_.frames - 1);
     const int from = step > 0 ? best.last : best.first;
     int f = from;
-    while (f != limit && keeps(best.slide, f + step, std::abs(f + step - from))) f += step;
+    while (f != limit && keeps(best.slide, from, f + step)) f += step;
     return f;
   }
 
@@ -70,17 +77,20 @@ class EndFitter {
     for (int inset = 0; inset <= reach; ++inset) {
       const int first = step > 0 ? contact_.last_frame - inset - span + 1 : contact_.first_frame + inset;
       const Slide slide = fit_slide(path_, first, first + span - 1);
-      if (slide.stray >= 0.8 * least) continue;  // clearly stiller than one that is nearer to the end
-      least = slide.stray;
+      if (slide.stray + slide.bob >= 0.8 * least) continue;  // clearly stiller than one that is nearer to the end
+      least = slide.stray + slide.bob;
       best = {first, first + span - 1, slide};
     }
     return best;
   }
 
-  [[nodiscard]] bool keeps(const Slide& slide, int frame, int distance) const {
+  [[nodiscard]] bool keeps(const Slide& slide, int from, int frame) const {
     const double length = tracks_.feet.leg_length_cm;
-    const double near = std::clamp(4 * slide.stray, 0.00004 * length, 0.006 * length);
-    if ((path_[frame] - slide.at(frame)).norm() <= near + 0.15 * slide.speed.norm() * distance) return true;
+    const auto near = [&](double stray) { return std::clamp(4 * stray, 0.00004 * length, 0.006 * length); };
+    const Eigen::Vector3d off = path_[frame] - slide.at(frame);
+    const Eigen::Vector3d way = tracks_.root[frame] - tracks_.root[from];
+    const double slid = 0.15 * slide.speed.norm() * std::abs(frame - from) + 0.2 * std::hypot(way.x(), way.z());
+    if (std::abs(off.y()) <= near(slide.bob) && std::hypot(off.x(), off.z()) <= near(slide.stray) + slid) return true;
     return tracks_.velocity(path_, frame).norm() <= 0.005 * length;
   }
 

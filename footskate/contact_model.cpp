@@ -9,7 +9,7 @@ namespace kinespace {
 namespace {
 
 constexpr std::size_t neighbours = 5;
-constexpr float unlike_anything = 0.5F;  // leg lengths: no labelled keyframe within it
+constexpr float unlike_anything = 0.25F;  // leg lengths: no labelled keyframe within it
 
 // The distance of the nearest keyframe and the share of the nearest ones in which ankle and toe stand.
 struct Vote {

@@ -30,11 +30,12 @@ Bones bones_at(const FootTracks& t, int leg, int f) {
   return {(t.knee[leg][f] - t.hip[leg][f]).norm(), (t.at[2 * leg][f] - t.knee[leg][f]).norm()};
 }
 
-// A bend that goes neither below zero nor, softly, much below what it was.
+// A bend near zero, softly kept from it: what is less than 0.15, or than it was where that is less, nears 0.3 of that.
 double soft_bend(double bend, double was) {
-  const double least = std::min(was, 0.1);
-  if (bend >= 2 * least) return bend;
-  return least > 0 ? least + least * std::exp((bend - 2 * least) / least) : 0;
+  const double soft = std::min(was, 0.15);
+  if (bend >= soft || soft <= 0) return std::max(bend, soft);
+  const double least = 0.3 * soft;
+  return least + (soft - least) * std::exp((bend - soft) / (soft - least));
 }
 
 }  // namespace

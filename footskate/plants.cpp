@@ -106,14 +106,30 @@ class Placer {
   std::vector<char> placed_;
 };
 
-Vector3d turn_between(const Vector3d& from, const Vector3d& to) {
-  const Eigen::AngleAxisd turn(Eigen::Quaterniond::FromTwoVectors(from, to));
-  return turn.angle() * turn.axis();
+Eigen::Quaterniond rotation(const Vector3d& turn) {
+  const double angle = turn.norm();
+  return angle > 0 ? Eigen::Quaterniond(Eigen::AngleAxisd(angle, turn / angle)) : Eigen::Quaterniond::Identity();
 }
 
 Vector3d turned(const Vector3d& turn, const Vector3d& v) {
-  const double angle = turn.norm();
-  return angle > 0 ? Eigen::AngleAxisd(angle, turn / angle) * v : v;
+  return rotation(turn) * v;
+}
+
+// The turn with which the far joint, at `way` from the near one at `base`, is not under the floor.
+Vector3d turn_above(const Vector3d& base, const Vector3d& way, const Vector3d& turn, double floor) {
+  const Vector3d now = turned(turn, way);
+  const double length = now.norm();
+  const double rise = floor - base.y();
+  const Vector3d level(now.x(), 0, now.z());
+  if (now.y() >= rise || std::abs(rise) >= length || level.norm() < 1e-6 * length) return turn;
+  const Vector3d raised = level.normalized() * std::sqrt(length * length - rise * rise) + rise * Vector3d::UnitY();
+  const Eigen::AngleAxisd whole(Eigen::Quaterniond::FromTwoVectors(now, raised) * rotation(turn));
+  return whole.angle() * whole.axis();
+}
+
+Vector3d turn_between(const Vector3d& from, const Vector3d& to) {
+  const Eigen::AngleAxisd turn(Eigen::Quaterniond::FromTwoVectors(from, to));
+  return turn.angle() * turn.axis();
 }
 
 // The place at each frame of a joint that stands, else nullptr.
@@ -177,7 +193,29 @@ std::vector<Plant> place_plants(const FootTracks& tracks, const Ground& ground, 
   return Placer(tracks, ground, contacts).place();
 }
 
-FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& plants) {
+FloorUnder::FloorUnder(const FootTracks& tracks, const Ground& ground, const std::vector<Plant>& plants, int leg)
+    : ground_(ground) {
+  if (ground.kind != GroundKind::uneven) return;
+  const int slot = tracks.has(2 * leg + 1) ? 2 * leg + 1 : 2 * leg;
+  std::vector<double> after(tracks.frames, std::nan(""));
+  for (const Plant& p : plants) {
+    if (p.contact.slot != slot) continue;
+    std::fill(after.begin() + p.contact.first_frame, after.begin() + p.contact.last_frame + 1, p.place.y());
+  }
+  level_ = after;
+  for (int f = 1; f < tracks.frames; ++f) {
+    if (std::isnan(level_[f])) level_[f] = level_[f - 1];
+  }
+  for (int f = tracks.frames - 2; f >= 0; --f) {
+    if (std::isnan(after[f])) after[f] = after[f + 1];
+  }
+  for (int f = 0; f < tracks.frames; ++f) {
+    level_[f] = std::fmin(level_[f], after[f]);
+    if (std::isnan(level_[f])) level_[f] = ground.height_cm;
+  }
+}
+
+FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& plants, const FloorUnder& floor) {
   const std::size_t frames = tracks.frames;
   FootTask out{.planted = std::vector<char>(frames, 0),
                .flat = std::vector<char>(frames, 0),
@@ -194,10 +232,19 @@ FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& 
   }
   join_between(out.flat, tracks.rate_hz, out.turn);
   for (std::size_t f = 0; f < frames; ++f) {
+    if (out.planted[f] == 0) continue;
+    const bool has_toe = !toe_path.empty();
     if (ankle[f] != nullptr) {
       out.displacement[f] = *ankle[f] - ankle_path[f];
-    } else if (toe[f] != nullptr) {
-      out.displacement[f] = *toe[f] - turned(out.turn[f], toe_path[f] - ankle_path[f]) - ankle_path[f];
+      if (toe[f] != nullptr || !has_toe) continue;
+      const Vector3d way = toe_path[f] - ankle_path[f];
+      const double level = floor.at(*ankle[f] + way, static_cast<int>(f));
+      out.turn[f] = turn_above(*ankle[f], way, out.turn[f], level);
+    } else {
+      const Vector3d way = ankle_path[f] - toe_path[f];
+      const double level = floor.at(*toe[f] + way, static_cast<int>(f));
+      out.turn[f] = turn_above(*toe[f], way, out.turn[f], level);
+      out.displacement[f] = *toe[f] + turned(out.turn[f], way) - ankle_path[f];
     }
   }
   return out;

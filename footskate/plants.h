@@ -31,7 +31,22 @@ struct FootTask {
   std::vector<Eigen::Vector3d> displacement;  // cm, world, of the ankle; zero where not planted
 };
 
-[[nodiscard]] FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& plants);
+// The level that a foot may not go below: the ground; on uneven ground the lower of its plants before and after.
+class FloorUnder {
+ public:
+  FloorUnder(const FootTracks& tracks, const Ground& ground, const std::vector<Plant>& plants, int leg);
+  [[nodiscard]] double at(const Eigen::Vector3d& point, int frame) const {
+    return level_.empty() ? ground_.at(point) : level_[frame];
+  }
+
+ private:
+  Ground ground_;
+  std::vector<double> level_;  // uneven only
+};
+
+// Where one joint stands and the other would be under the floor, the foot turns until it is on it.
+[[nodiscard]] FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& plants,
+                                 const FloorUnder& floor);
 
 // Values given at the frames that `known` marks, joined between: it leaves and meets them with their own speed, has no
 // acceleration there, and before the first and after the last eases to zero within half a second. Twice continuously
