@@ -66,6 +66,16 @@ class Plausible {
   std::array<double, 4> stand_;
 };
 
+// Sets runs of at most `longest` frames between set ones: votes waver.
+void close_gaps(std::vector<char>& planted, int longest) {
+  int last = -1;
+  for (int f = 0; f < static_cast<int>(planted.size()); ++f) {
+    if (planted[f] == 0) continue;
+    if (last >= 0 && f - last - 1 <= longest) std::fill(planted.begin() + last, planted.begin() + f, 1);
+    last = f;
+  }
+}
+
 }  // namespace
 
 FootContacts ContactModel::detect(const FootTracks& tracks, const Ground& ground) const {
@@ -83,6 +93,7 @@ FootContacts ContactModel::detect(const FootTracks& tracks, const Ground& ground
         planted[joint][f] = v.share[joint] >= 0.5 && plausible(2 * leg + joint, static_cast<int>(f)) ? 1 : 0;
       }
     }
+    for (auto& frames : planted) close_gaps(frames, static_cast<int>(0.06 * tracks.rate_hz));
     for (int joint = 0; joint < 2; ++joint) append_runs(planted[joint], 2 * leg + joint, found);
   }
   return fit_ends(tracks, found);

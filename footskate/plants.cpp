@@ -171,8 +171,8 @@ struct GapEnd {
 };
 
 Vector3d joined(const GapEnd& a, const GapEnd& b, int f, double rate_hz) {
-  const double ease = 0.5 * rate_hz;   // frames to ease to zero at the ends of the clip
-  const double coast = 0.4 * rate_hz;  // frames in which a speed runs out
+  const double ease = 0.5 * rate_hz;    // frames to ease to zero at the ends of the clip
+  const double coast = 0.15 * rate_hz;  // frames in which a speed runs out
   const double gap = a.known && b.known ? b.frame - a.frame : ease;
   const double run = std::min(gap, coast);
   Vector3d out = Vector3d::Zero();
