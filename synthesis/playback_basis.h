@@ -1,0 +1,67 @@
+// The functions of a motion space as tables for playback: their values at any time, and the integrals that the root's
+// travel needs.
+//
+// Between two points of the space's grid a function is a cubic (fpca/uniform_spline.h), so a value is four numbers and
+// the place in the cell. Entry 0 is the mean function, entry k the k-th function. The root's travel is the integral of
+// the velocity v(s) over own time h(s), h'(s) = 1 + sum_j a_j cos(j pi s) (fpca/warp.h), which is linear in the
+// functions and in the a_j:
+//
+//   integral_0^s v h' = sum_j a_j sum_k x_k integral_0^s phi_k(s) cos(j pi s) ds,   a_0 = x_0 = 1
+//
+// so the integrals are tabulated for j = 0 .. 5, as decode() takes them: of the samples, by spline. Floats: a space of
+// 128 points and 32 functions takes 0.5 MB. One basis serves all clips of a space.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "fpca/motion_space.h"
+#include "fpca/warp.h"
+
+namespace kinespace {
+
+class PlaybackBasis {
+ public:
+  static constexpr int lanes = 16;
+  static constexpr int warp_terms = Warp::terms + 1;
+
+  // With at most `functions` functions (all when < 0).
+  explicit PlaybackBasis(const MotionSpace& space, int functions = -1);
+
+  [[nodiscard]] int functions() const { return functions_; }
+  [[nodiscard]] int points() const { return points_; }
+  [[nodiscard]] int curves() const { return static_cast<int>(group_of_.size()); }
+  [[nodiscard]] int group_of(int curve) const { return group_of_[static_cast<std::size_t>(curve)]; }
+  // Whether the same components of all joints share functions, as they do in the two coarser groupings.
+  [[nodiscard]] bool by_component() const { return by_component_; }
+  // Entries of a table, mean first, rounded up to lanes; those beyond functions() are 0.
+  [[nodiscard]] int padded() const { return padded_; }
+
+  // Coefficients of 1, b, b^2, b^3, `padded` floats each, of the functions of a group between points i and i + 1.
+  [[nodiscard]] const float* values(int group, int cell) const {
+    return values_.data() + (static_cast<std::size_t>(group) * cells() + static_cast<std::size_t>(cell)) * 4 * width();
+  }
+  // The same of the integrals of the group that curve 0 .. 2 belongs to: warp_terms times four.
+  [[nodiscard]] const float* integrals(int axis, int cell) const {
+    return integrals_.data() + (slot(axis) * cells() + static_cast<std::size_t>(cell)) * warp_terms * 4 * width();
+  }
+  // Integrals over all of [0, 1]: [warp term][padded].
+  [[nodiscard]] const float* ends(int axis) const { return ends_.data() + slot(axis) * warp_terms * width(); }
+
+ private:
+  [[nodiscard]] std::size_t cells() const { return static_cast<std::size_t>(points_) - 1; }
+  [[nodiscard]] std::size_t width() const { return static_cast<std::size_t>(padded_); }
+  [[nodiscard]] std::size_t slot(int axis) const { return one_velocity_group_ ? 0 : static_cast<std::size_t>(axis); }
+
+  int functions_ = 0;
+  int points_ = 0;
+  int padded_ = 0;
+  bool by_component_ = false;
+  bool one_velocity_group_ = false;
+  std::vector<int> group_of_;
+  std::vector<float> values_;
+  std::vector<float> integrals_;
+  std::vector<float> ends_;
+};
+
+}  // namespace kinespace

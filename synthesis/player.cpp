@@ -1,0 +1,365 @@
+#include "synthesis/player.h"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstring>
+
+#include "fpca/cut_join.h"
+#include "kernels/simd.h"
+#include "synthesis/player_parts.h"
+
+namespace kinespace {
+namespace {
+
+constexpr int lanes = PlaybackBasis::lanes;
+constexpr int most_entries = 1024 + 2 * lanes;  // functions of a space, and the mean
+using Vector = float __attribute__((vector_size(lanes * sizeof(float))));
+using Indices = int __attribute__((vector_size(lanes * sizeof(int))));
+
+// A neighbouring cut's part in a pose: its corrections and by how much they count; none: nullptr.
+struct CutPart {
+  const float* correction = nullptr;
+  float value = 0;
+  float slope = 0;
+};
+
+// All that a pose is computed from.
+struct PoseJob {
+  int functions = 0;
+  int padded = 0;
+  float b = 0;
+  const float* values[4] = {};  // of the four components; often the same
+  const float* integrals[3] = {};
+  const float* ends[3] = {};
+  const float* warp = nullptr;
+  int warp_terms = 1;
+  float own = 0;
+  float duration_s = 0;
+  const float* travel = nullptr;
+  const float* scores = nullptr;
+  const float* velocity_scores = nullptr;
+  int joint_lanes = 0;
+  int joints = 0;
+  CutPart cuts[2];
+  float* rotations = nullptr;
+  float place[3] = {};  // metres from the sequence's start
+};
+
+// out[0 .. count) += factor * cubic at b
+KINESPACE_SIMD_BODY void add_cubics(const float* cubic, int padded, int count, float b, float factor, float* out) {
+  for (int k = 0; k < count; k += lanes) {
+    Vector c0;
+    Vector c1;
+    Vector c2;
+    Vector c3;
+    Vector sum;
+    std::memcpy(&c0, cubic + k, sizeof(Vector));
+    std::memcpy(&c1, cubic + padded + k, sizeof(Vector));
+    std::memcpy(&c2, cubic + 2 * padded + k, sizeof(Vector));
+    std::memcpy(&c3, cubic + 3 * padded + k, sizeof(Vector));
+    std::memcpy(&sum, out + k, sizeof(Vector));
+    sum += factor * (c0 + b * (c1 + b * (c2 + b * c3)));
+    std::memcpy(out + k, &sum, sizeof(Vector));
+  }
+}
+
+KINESPACE_SIMD_BODY void clear(int count, float* out) {
+  const Vector zero{};
+  for (int k = 0; k < count; k += lanes) std::memcpy(out + k, &zero, sizeof(Vector));
+}
+
+// u travel + duration sum_j a_j sum_k x_k (I_jk(s) - u I_jk(1)): where the root is, so that it ends where it should.
+KINESPACE_SIMD_BODY void place_root(PoseJob& job) {
+  alignas(64) float weights[most_entries];
+  const int count = job.functions + 1;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (axis == 0 || job.integrals[axis] != job.integrals[0]) {
+      clear(count, weights);
+      for (int j = 0; j < job.warp_terms; ++j) {
+        const float factor = job.warp[j] * job.duration_s;
+        add_cubics(job.integrals[axis] + 4 * j * job.padded, job.padded, count, job.b, factor, weights);
+        const float* ends = job.ends[axis] + j * job.padded;
+        const float part = factor * job.own;
+        for (int k = 0; k < count; k += lanes) {
+          Vector w;
+          Vector end;
+          std::memcpy(&w, weights + k, sizeof(Vector));
+          std::memcpy(&end, ends + k, sizeof(Vector));
+          w -= part * end;
+          std::memcpy(weights + k, &w, sizeof(Vector));
+        }
+      }
+    }
+    float sum = job.own * job.travel[axis] + weights[0];
+    for (int k = 1; k < count; ++k) sum += weights[k] * job.velocity_scores[4 * (k - 1) + axis];
+    const std::ptrdiff_t slopes = 8 * static_cast<std::ptrdiff_t>(job.joint_lanes);
+    for (const CutPart& cut : job.cuts) {
+      if (cut.correction != nullptr) sum -= cut.slope * cut.correction[slopes + axis];
+    }
+    job.place[axis] = sum;
+  }
+}
+
+// Renormalises the four components (1 / sqrt by Newton's iteration, the same on every processor) and stores them joint
+// by joint.
+KINESPACE_SIMD_BODY void store_rotations(const Vector* q, int count, float* out) {
+  const Vector square = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
+  Indices bits;
+  std::memcpy(&bits, &square, sizeof(bits));
+  bits = 0x5f3759df - (bits >> 1);
+  Vector scale;
+  std::memcpy(&scale, &bits, sizeof(scale));
+  for (int i = 0; i < 4; ++i) scale = scale * (1.5F - 0.5F * square * scale * scale);
+
+  const Indices low = {0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23};
+  const Indices high = low + 8;
+  const Indices first = {0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23};
+  const Indices second = first + 8;
+  const Vector w = q[0] * scale;
+  const Vector x = q[1] * scale;
+  const Vector y = q[2] * scale;
+  const Vector z = q[3] * scale;
+  const Vector wx_low = __builtin_shuffle(w, x, low);
+  const Vector wx_high = __builtin_shuffle(w, x, high);
+  const Vector yz_low = __builtin_shuffle(y, z, low);
+  const Vector yz_high = __builtin_shuffle(y, z, high);
+  const Vector rows[4] = {__builtin_shuffle(wx_low, yz_low, first), __builtin_shuffle(wx_low, yz_low, second),
+                          __builtin_shuffle(wx_high, yz_high, first), __builtin_shuffle(wx_high, yz_high, second)};
+  std::memcpy(out, rows, static_cast<std::size_t>(count) * 4 * sizeof(float));
+}
+
+KINESPACE_SIMD_BODY void play_body(PoseJob& job) {
+  place_root(job);
+  alignas(64) float weights[4][most_entries];
+  const float* weight[4];
+  const int count = job.functions + 1;
+  for (int q = 0; q < 4; ++q) {
+    if (q > 0 && job.values[q] == job.values[q - 1]) {
+      weight[q] = weight[q - 1];
+      continue;
+    }
+    clear(count, weights[q]);
+    add_cubics(job.values[q], job.padded, count, job.b, 1, weights[q]);
+    weight[q] = weights[q];
+  }
+  for (int start = 0; start < job.joint_lanes; start += lanes) {
+    Vector sum[4];
+    for (int q = 0; q < 4; ++q) sum[q] = Vector{} + weight[q][0];
+    const float* scores = job.scores + start;
+    for (int k = 1; k < count; ++k) {
+      for (int q = 0; q < 4; ++q, scores += job.joint_lanes) {
+        Vector x;
+        std::memcpy(&x, scores, sizeof(Vector));
+        sum[q] += weight[q][k] * x;
+      }
+    }
+    for (const CutPart& cut : job.cuts) {
+      if (cut.correction == nullptr) continue;
+      for (int q = 0; q < 4; ++q) {
+        Vector value;
+        Vector slope;
+        std::memcpy(&value, cut.correction + q * job.joint_lanes + start, sizeof(Vector));
+        std::memcpy(&slope, cut.correction + (4 + q) * job.joint_lanes + start, sizeof(Vector));
+        sum[q] += cut.value * value - cut.slope * slope;
+      }
+    }
+    const int joints = job.joints - start < lanes ? job.joints - start : lanes;
+    store_rotations(sum, joints, job.rotations + 4 * start);
+  }
+}
+KINESPACE_SIMD(play, void, (PoseJob & job), (job))
+
+// The parts that the cuts at both ends of a sequence have at a place.
+void add_cut_parts(const PlayerParts& parts, const PlayerParts::Place& place, int level, CutPart* out) {
+  const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
+  const double blend = parts.options.join.blend;
+  const auto at = [&](std::size_t cut) {
+    return parts.cuts.data() + cut + static_cast<std::size_t>(level) * parts.cut_stride();
+  };
+  if (sequence.joined_before && place.own < blend) {
+    const Fade weight = fade(place.own, blend);
+    out[0] = {at(parts.sequences[place.sequence - 1].cut), static_cast<float>(-weight.value),
+              static_cast<float>(weight.slope) * sequence.steepness};
+  }
+  if (sequence.joined_after && 1 - place.own < blend) {
+    const Fade weight = fade(1 - place.own, blend);
+    out[1] = {at(sequence.cut), static_cast<float>(weight.value),
+              static_cast<float>(weight.slope) * sequence.steepness};
+  }
+}
+
+}  // namespace
+
+PlayerParts::Place PlayerParts::place_in(std::size_t index, double own) const {
+  const Sequence& sequence = sequences[index];
+  double s = own;
+  if (sequence.warped) {
+    // Cubic between tabulated values and slopes.
+    const double x = own * inverse_cells;
+    const int i = std::min(static_cast<int>(x), inverse_cells - 1);
+    const double t = x - i;
+    const float* p = inverse.data() + sequence.inverse + 2 * i;
+    const double change = static_cast<double>(p[2]) - static_cast<double>(p[0]);
+    const double d0 = static_cast<double>(p[1]) / inverse_cells - change;
+    const double d1 = change - static_cast<double>(p[3]) / inverse_cells;
+    s = static_cast<double>(p[0]) + t * (change + (1 - t) * (d0 * (1 - t) + d1 * t));
+  }
+  const double x = s * (basis->points() - 1);
+  const int cell = std::clamp(static_cast<int>(x), 0, basis->points() - 2);
+  return {.sequence = index, .own = own, .cell = cell, .b = static_cast<float>(x - cell)};
+}
+
+PlayerParts::Place PlayerParts::place_at(double time_s) const {
+  const double end = frames - 1;
+  double x = time_s * rate_hz;
+  if (!(x > 0 && x < end)) {
+    // The end itself is the end's pose, looped or not.
+    if (options.loop && end > 0 && x != end && std::isfinite(x)) {
+      x = std::fmod(x, end);
+      if (x < 0) x += end;
+    }
+    x = std::clamp(std::isnan(x) ? 0.0 : x, 0.0, end);
+  }
+  auto index = static_cast<std::size_t>(at[static_cast<std::size_t>(static_cast<int>(x) / bucket)]);
+  while (index + 1 < sequences.size() && sequences[index + 1].first <= x) ++index;
+  const Sequence& sequence = sequences[index];
+  const double into = x - sequence.first;
+  const double beyond = into - sequence.intervals;
+  if (beyond <= 0) return place_in(index, sequence.intervals == 0 ? 0 : into / sequence.intervals);
+  // Between the two frames beside a break.
+  if (beyond > 0.5 && index + 1 < sequences.size()) return place_in(index + 1, 0);
+  return place_in(index, sequence.intervals == 0 ? 0 : 1);
+}
+
+Eigen::Vector3f PlayerParts::world_place(const Sequence& sequence, const float* from_start) const {
+  constexpr double cm_per_metre = 100;
+  const double c = static_cast<double>(turn_cosine);
+  const double s = static_cast<double>(turn_sine);
+  const double x = sequence.start.x() + static_cast<double>(from_start[0]);
+  const double y = sequence.start.y() + static_cast<double>(from_start[1]);
+  const double z = sequence.start.z() + static_cast<double>(from_start[2]);
+  const double cosine = c * c - s * s;
+  const double sine = 2 * c * s;
+  return {static_cast<float>(start_cm.x() + cm_per_metre * (cosine * x + sine * z)),
+          static_cast<float>(start_cm.y() + cm_per_metre * y),
+          static_cast<float>(start_cm.z() + cm_per_metre * (cosine * z - sine * x))};
+}
+
+void PlayerParts::turn_root(float* q) const {
+  const float w = q[0];
+  const float x = q[1];
+  const float y = q[2];
+  const float z = q[3];
+  q[0] = turn_cosine * w - turn_sine * y;
+  q[1] = turn_cosine * x + turn_sine * z;
+  q[2] = turn_cosine * y + turn_sine * w;
+  q[3] = turn_cosine * z - turn_sine * x;
+}
+
+double Player::duration_s() const {
+  return (parts_->frames - 1) / parts_->rate_hz;
+}
+int Player::joints() const {
+  return parts_->joints;
+}
+int Player::functions() const {
+  return parts_->basis->functions();
+}
+
+Eigen::Vector3f Player::pose(double time_s, int functions, std::span<float> rotations) const {
+  const PlayerParts& parts = *parts_;
+  const PlaybackBasis& basis = *parts.basis;
+  if (!basis.by_component()) return reference::pose(*this, time_s, functions, rotations);
+  assert(rotations.size() >= 4 * static_cast<std::size_t>(parts.joints));
+  const PlayerParts::Place place = parts.place_at(time_s);
+  const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
+  PoseJob job;
+  job.functions = parts.level(functions);
+  job.padded = basis.padded();
+  job.b = place.b;
+  for (int q = 0; q < 4; ++q) job.values[q] = basis.values(basis.group_of(3 + q), place.cell);
+  for (int axis = 0; axis < 3; ++axis) {
+    job.integrals[axis] = basis.integrals(axis, place.cell);
+    job.ends[axis] = basis.ends(axis);
+  }
+  job.warp = sequence.warp.data();
+  job.warp_terms = PlayerParts::warp_terms(sequence);
+  job.own = static_cast<float>(place.own);
+  job.duration_s = sequence.duration_s;
+  job.travel = sequence.travel.data();
+  job.scores = parts.scores.data() + sequence.scores;
+  job.velocity_scores = parts.velocity_scores(sequence);
+  job.joint_lanes = parts.lanes;
+  job.joints = parts.joints;
+  add_cut_parts(parts, place, job.functions, job.cuts);
+  job.rotations = rotations.data();
+  play(job);
+  parts.turn_root(rotations.data());
+  return parts.world_place(sequence, job.place);
+}
+
+namespace reference {
+
+Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::span<float> rotations) {
+  const PlayerParts& parts = PlayerParts::of(player);
+  const PlaybackBasis& basis = *parts.basis;
+  assert(rotations.size() >= 4 * static_cast<std::size_t>(parts.joints));
+  const PlayerParts::Place place = parts.place_at(time_s);
+  const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
+  const int level = parts.level(functions);
+  CutPart cuts[2];
+  add_cut_parts(parts, place, level, cuts);
+  const int padded = basis.padded();
+  const auto cubic = [&](const float* c, int k) {
+    return c[k] + place.b * (c[padded + k] + place.b * (c[2 * padded + k] + place.b * c[3 * padded + k]));
+  };
+
+  const auto own = static_cast<float>(place.own);
+  float from_start[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    float sum = own * sequence.travel[static_cast<std::size_t>(axis)];
+    for (int k = 0; k <= level; ++k) {
+      float weight = 0;
+      for (int j = 0; j < PlayerParts::warp_terms(sequence); ++j) {
+        const float integral = cubic(basis.integrals(axis, place.cell) + 4 * j * padded, k);
+        weight += sequence.warp[static_cast<std::size_t>(j)] * sequence.duration_s *
+                  (integral - own * basis.ends(axis)[j * padded + k]);
+      }
+      sum += weight * (k == 0 ? 1.0F : parts.velocity_scores(sequence)[4 * (k - 1) + axis]);
+    }
+    for (const CutPart& cut : cuts) {
+      if (cut.correction != nullptr)
+        sum -= cut.slope * cut.correction[2 * parts.score_stride() + static_cast<std::size_t>(axis)];
+    }
+    from_start[axis] = sum;
+  }
+
+  const float* scores = parts.scores.data() + sequence.scores;
+  for (int joint = 0; joint < parts.joints; ++joint) {
+    float q[4];
+    for (int component = 0; component < 4; ++component) {
+      const float* values = basis.values(basis.group_of(3 + 4 * joint + component), place.cell);
+      const auto column = static_cast<std::size_t>(component * parts.lanes + joint);
+      float sum = cubic(values, 0);
+      for (int k = 1; k <= level; ++k) {
+        sum += cubic(values, k) * scores[static_cast<std::size_t>(k - 1) * parts.score_stride() + column];
+      }
+      for (const CutPart& cut : cuts) {
+        if (cut.correction == nullptr) continue;
+        sum += cut.value * cut.correction[column] - cut.slope * cut.correction[parts.score_stride() + column];
+      }
+      q[component] = sum;
+    }
+    const float length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    for (std::size_t i = 0; i < 4; ++i) {
+      rotations[4 * static_cast<std::size_t>(joint) + i] = length > 0 ? q[i] / length : q[i];
+    }
+  }
+  parts.turn_root(rotations.data());
+  return parts.world_place(sequence, from_start);
+}
+
+}  // namespace reference
+
+}  // namespace kinespace
