@@ -1,0 +1,30 @@
+// How far decoded clips are from the originals, summed up over many clips: what a codec writes into its stream's header.
+// The measures are those of motion/error_measures.h, weighted by frames times joints.
+#pragma once
+
+#include <cstdint>
+
+#include "motion/clip.h"
+#include "storage/bitstream.h"
+
+namespace kinespace {
+
+struct ClipErrorSums {
+  double distance = 0;
+  double largest = 0;
+  double shell = 0;
+  std::int64_t count = 0;  // joints times frames
+
+  void add(const ClipErrorSums& other);
+  [[nodiscard]] double mean_cm() const { return count > 0 ? distance / static_cast<double>(count) : 0; }
+  [[nodiscard]] double shell_cm() const { return count > 0 ? shell / static_cast<double>(count) : 0; }
+  // As 32-bit floats that are not below the measured ones.
+  [[nodiscard]] MeasuredError measured() const;
+};
+
+// Frames [first, first + count) of clips of the same joints in the same order; frame `first` of `original` against frame
+// `decoded_first` of `decoded`.
+[[nodiscard]] ClipErrorSums clip_error(const Clip& original, const Clip& decoded, int first, int count,
+                                       int decoded_first);
+
+}  // namespace kinespace

@@ -1,0 +1,222 @@
+// The search for the step that meets a target.
+#include "codecs/motion_space_codec.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "codecs/motion_space_encoder.h"
+#include "codecs/registry.h"
+
+namespace kinespace {
+namespace {
+
+constexpr std::array codec_settings{
+    CodecSetting{"step", 2.5, 1e-6, 1e6, "quantiser step where no target is given, in cm times the root of the joints"},
+    CodecSetting{"shell_ratio", 1.6, 1.05, 100, "largest shell error, as a multiple of the mean joint error"},
+    CodecSetting{"rate_weight", 0.14, 0, 1, "squared steps that a bit is worth when values are chosen"},
+    CodecSetting{"window_s", 0, 0, 60, "length of the windows in seconds; 0: cut where it saves bits"},
+    CodecSetting{"group_frames", 4096, 1, 1 << 20, "frames that are decoded together at least"},
+};
+
+// Steps for errors: what both the 30 Hz and the 120 Hz recordings of the benches need, to within a factor of 2.
+double step_for(double mean_error_cm) {
+  return 7 * mean_error_cm;
+}
+
+class Search {
+ public:
+  Search(std::span<const Clip> clips, const CodecOptions& options, MotionSpaceSettings settings, double shell_ratio)
+      : encoder_(clips, options.progress), options_(options), settings_(settings), shell_ratio_(shell_ratio) {
+    const std::int64_t groups = encoder_.frames() / settings_.group_frames;
+    sample_ = static_cast<int>(std::clamp<std::int64_t>(groups / 6, 1, 64));
+  }
+
+  Bytes at_step(double step) {
+    settle(step);
+    return finish(encoder_.attempt(step, settings_, &*last_));
+  }
+
+  Bytes for_mean_error(double target) {
+    double step = step_for(target);
+    step = approach(step, target);
+    settle(step);
+    step = approach(step, target);
+    // The sample is not the whole: correct on the whole until the bound holds.
+    constexpr int most_rounds = 12;
+    double goal = target;
+    for (int round = 0; round < most_rounds; ++round) {
+      Attempt attempt = encoder_.attempt(step, settings_, &*last_);
+      const double error = attempt.error.mean_cm();
+      const bool met = error <= target;
+      const bool close = error >= 0.98 * target || error == 0;
+      const bool shell = attempt.error.shell_cm() <= shell_ratio_ * std::max(error, 1e-9) || error == 0;
+      if (!shell && round + 1 < most_rounds) {
+        raise_shell_weight(step);
+        continue;
+      }
+      if (met && (close || round > 4)) {
+        Bytes out = finish(attempt);
+        if (Bitstream::parse(out, "").error().mean_joint_error_cm <= target) return out;
+      }
+      if (!met) goal = std::min(goal, target) * 0.998;
+      step *= std::clamp(std::pow(goal / std::max(error, 1e-12), 1.1), 0.25, 4.0);
+    }
+    cannot_meet(fmt::format("a mean joint error of {} cm", target), "a larger one");
+  }
+
+  Bytes for_max_error(double target) {
+    // Coarser steps leave more windows to refine; the best of a few starts.
+    Bytes best;
+    double step = step_for(target / 3.5);
+    settle(step);
+    for (int start = 0; start < 4; ++start, step /= 1.35) {
+      Bytes out = refine(step, target);
+      if (!out.empty() && (best.empty() || out.size() < best.size())) {
+        best = std::move(out);
+      } else if (!best.empty()) {
+        break;
+      }
+    }
+    if (best.empty()) cannot_meet(fmt::format("a largest joint error of {} cm", target), "a larger one");
+    return best;
+  }
+
+  Bytes for_bytes(std::int64_t target) {
+    double step = 2.5;
+    settle(step);
+    Bytes best;
+    double fits = 0;     // the finest step known to fit
+    double too_fine = 0;  // the coarsest known not to
+    constexpr int most_rounds = 16;
+    for (int round = 0; round < most_rounds; ++round) {
+      Bytes out = finish(encoder_.attempt(step, settings_, &*last_));
+      const auto size = static_cast<std::int64_t>(out.size());
+      if (size <= target) {
+        if (out.size() > best.size()) best = std::move(out);
+        fits = fits == 0 ? step : std::min(fits, step);
+        if (static_cast<double>(size) > 0.985 * static_cast<double>(target) || step < 1e-4) break;
+      } else {
+        too_fine = std::max(too_fine, step);
+        if (step > 1e5) break;
+      }
+      const double ratio = static_cast<double>(size) / (0.995 * static_cast<double>(target));
+      step *= std::clamp(std::pow(ratio, 1.5), 0.1, 10.0);
+      const bool inside = fits == 0 || too_fine == 0 || (step > too_fine && step < fits);
+      if (!inside) step = std::sqrt(fits * too_fine);
+      if (fits > 0 && too_fine > 0 && fits < 1.003 * too_fine) break;
+    }
+    if (best.empty()) cannot_meet(fmt::format("{} bytes", target), "more; tables and names alone take that");
+    return best;
+  }
+
+ private:
+  // Plans for this step, and finds the shell weight that holds the ratio.
+  void settle(double step) {
+    encoder_.plan(step, settings_);
+    planned_ = true;
+    MotionSpaceSettings sampled = settings_;
+    sampled.sample = std::max(2, sample_);
+    constexpr int most_rounds = 6;
+    for (int round = 0; round < most_rounds; ++round) {
+      last_ = encoder_.attempt(step, sampled, last_ ? &*last_ : nullptr);
+      const double error = last_->error.mean_cm();
+      if (error == 0 || last_->error.shell_cm() <= 0.985 * shell_ratio_ * error) return;
+      settings_.shell_weight *= 1.6;
+      sampled.shell_weight = settings_.shell_weight;
+      encoder_.plan(step, settings_);
+    }
+  }
+
+  void raise_shell_weight(double step) {
+    settings_.shell_weight *= 1.4;
+    settle(step);
+  }
+
+  // Steps on the sample until its error is near the target.
+  double approach(double step, double target) {
+    if (!planned_) {
+      encoder_.plan(step, settings_);
+      planned_ = true;
+    }
+    MotionSpaceSettings sampled = settings_;
+    sampled.sample = std::max(2, sample_);
+    constexpr int most_rounds = 6;
+    for (int round = 0; round < most_rounds; ++round) {
+      last_ = encoder_.attempt(step, sampled, last_ ? &*last_ : nullptr);
+      const double error = last_->error.mean_cm();
+      if (!(error > 0)) return step;
+      const double factor = target / error;
+      step *= std::clamp(std::pow(factor, 1.15), 0.1, 4.0);
+      if (factor > 0.98 && factor < 1.02) break;
+    }
+    return step;
+  }
+
+  // Makes the windows finer that are off by more; empty when some cannot be.
+  Bytes refine(double step, double target) {
+    std::vector<int> finer(encoder_.window_count(), 0);
+    constexpr int most_rounds = 24;
+    for (int round = 0; round < most_rounds; ++round) {
+      const Attempt attempt = encoder_.attempt(step, settings_, &*last_, finer);
+      bool met = true;
+      for (std::size_t w = 0; w < finer.size(); ++w) {
+        const double error = attempt.largest[w];
+        if (error <= target) continue;
+        met = false;
+        const int more = std::max(1, static_cast<int>(std::lround(1.7 * std::log2(error / target))));
+        finer[w] += more;
+        if (finer[w] > finest_block) return {};
+      }
+      if (!met) continue;
+      Bytes out = finish(attempt);
+      if (Bitstream::parse(out, "").error().max_joint_error_cm <= target) return out;
+      target *= 0.999;
+    }
+    return {};
+  }
+
+  // Writes the stream with the errors of what a reader decodes from it.
+  Bytes finish(const Attempt& attempt) {
+    const Bytes draft = write_stream(attempt, {});
+    const auto reader = find_codec("motion-space").open(Bitstream::parse(draft, "the stream"));
+    const std::vector<Clip> decoded = reader->decode_all();
+    return write_stream(attempt, encoder_.error_of(decoded).measured());
+  }
+
+  [[noreturn]] static void cannot_meet(std::string found, std::string expected) {
+    throw Error(ErrorKind::usage, {.found = "a target that cannot be met: " + found, .expected = std::move(expected)});
+  }
+
+  MotionSpaceEncoder encoder_;
+  const CodecOptions& options_;
+  MotionSpaceSettings settings_;
+  double shell_ratio_;
+  int sample_ = 1;
+  bool planned_ = false;
+  std::optional<Attempt> last_;
+};
+
+}  // namespace
+
+std::span<const CodecSetting> MotionSpaceCodec::settings() const {
+  return codec_settings;
+}
+
+Bytes MotionSpaceCodec::encode(std::span<const Clip> clips, const CodecOptions& options) const {
+  const MotionSpaceSettings settings{.rate_weight = setting(options, "rate_weight"),
+                                     .window_s = setting(options, "window_s"),
+                                     .group_frames = static_cast<int>(setting(options, "group_frames"))};
+  Search search(clips, options, settings, setting(options, "shell_ratio"));
+  const CodecTarget& target = options.target;
+  if (target.mean_error_cm) return search.for_mean_error(*target.mean_error_cm);
+  if (target.max_error_cm) return search.for_max_error(*target.max_error_cm);
+  if (target.bytes) return search.for_bytes(*target.bytes);
+  return search.at_step(setting(options, "step"));
+}
+
+}  // namespace kinespace

@@ -1,0 +1,398 @@
+#include "codecs/motion_space_encoder.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+
+#include <tbb/parallel_for.h>
+
+#include "base/error.h"
+#include "codecs/registry.h"
+#include "codecs/time_blocks.h"
+#include "storage/bitstream.h"
+#include "storage/varint.h"
+
+namespace kinespace {
+namespace {
+
+constexpr std::size_t metric_samples = 256;
+constexpr int planned_components = 16;  // that windows are planned by: nearly all of the energy
+static const int coarsest_exponent = getenv("CE") ? atoi(getenv("CE")) : 5; static const int extra_exponent = getenv("EE") ? atoi(getenv("EE")) : 2;
+constexpr double unlikely = 0.62;       // steps; what is smaller will be coded as zero
+
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using Curves = Eigen::Map<const RowMatrix>;
+
+Curves curves_of(const PoseVectors& vectors, int dimensions) {
+  return {vectors.values.data(), dimensions, vectors.frames};
+}
+
+// Frames where a body is suddenly elsewhere: in whitened curves the distance from frame to frame is that of the joints
+// together, in cm.
+std::vector<int> find_jumps(const RowMatrix& curves, std::vector<int> jumps) {
+  constexpr double break_cm = 10;
+  constexpr double break_ratio = 4;
+  const Eigen::Index n = curves.cols();
+  std::vector<double> travel(static_cast<std::size_t>(n), 0.0);
+  for (Eigen::Index f = 1; f < n; ++f) travel[static_cast<std::size_t>(f)] = (curves.col(f) - curves.col(f - 1)).norm();
+  for (std::size_t f = 1; f < travel.size(); ++f) {
+    const double before = f > 1 ? travel[f - 1] : 0;
+    const double after = f + 1 < travel.size() ? travel[f + 1] : 0;
+    if (travel[f] > break_cm && travel[f] > break_ratio * std::max(before, after)) jumps.push_back(static_cast<int>(f));
+  }
+  std::ranges::sort(jumps);
+  jumps.erase(std::unique(jumps.begin(), jumps.end()), jumps.end());
+  return jumps;
+}
+
+std::vector<int> equal_windows(int frames, int wanted) {
+  const int count = std::max(1, (frames + wanted / 2) / wanted);
+  std::vector<int> out;
+  for (int i = 0; i < count; ++i) {
+    const auto at = [&](int k) { return static_cast<int>(static_cast<std::int64_t>(frames) * k / count); };
+    out.push_back(at(i + 1) - at(i));
+  }
+  return out;
+}
+
+double finer_factor(int finer) {
+  return std::pow(2.0, 0.5 * finer);
+}
+
+}  // namespace
+
+MotionSpaceEncoder::MotionSpaceEncoder(std::span<const Clip> clips, const Progress& progress)
+    : clips_(clips), progress_(progress), vectors_(clips.size()) {
+  std::vector<ClipCurves> curves(clips.size());
+  for (const Clip& clip : clips) {
+    const int skeleton = table_.add_skeleton(clip.skeleton, clip.name);
+    table_.clips.push_back({.name = clip.name, .skeleton = skeleton, .rate_hz = clip.rate_hz, .frames = clip.frames});
+    frames_ += clip.frames;
+  }
+  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) { curves[c] = clip_curves(clips[c]); });
+  ReferencePoseBuilder builder(table_.skeletons.front());
+  for (const ClipCurves& one : curves) builder.add(one);
+  reference_ = builder.build();
+  progress_.check_stop();
+  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
+    vectors_[c] = pose_vectors(curves[c], reference_);
+    table_.clips[c].placement = vectors_[c].placement;
+    table_.clips[c].side_tracks = vectors_[c].side_tracks;
+  });
+  add_moments();
+  add_metrics();
+}
+
+void MotionSpaceEncoder::add_moments() {
+  const int d = reference_.dimensions();
+  std::vector<Eigen::MatrixXd> parts(vectors_.size());
+  tbb::parallel_for(std::size_t{0}, vectors_.size(), [&](std::size_t c) {
+    const Curves x = curves_of(vectors_[c], d);
+    parts[c] = Eigen::MatrixXd::Zero(d, d);
+    parts[c].selfadjointView<Eigen::Lower>().rankUpdate(x);
+  });
+  moments_ = Eigen::MatrixXd::Zero(d, d);
+  for (const Eigen::MatrixXd& part : parts) moments_ += part;
+  moments_ = Eigen::MatrixXd(moments_.selfadjointView<Eigen::Lower>()) / static_cast<double>(frames_);
+}
+
+void MotionSpaceEncoder::add_metrics() {
+  const int d = reference_.dimensions();
+  const std::int64_t samples = std::min<std::int64_t>(frames_, metric_samples);
+  std::vector<PoseMetric> parts(static_cast<std::size_t>(samples));
+  std::vector<std::int64_t> first{0};
+  for (const PoseVectors& v : vectors_) first.push_back(first.back() + v.frames);
+  tbb::parallel_for(std::int64_t{0}, samples, [&](std::int64_t s) {
+    const std::int64_t frame = (2 * s + 1) * frames_ / (2 * samples);
+    const auto c = static_cast<std::size_t>(std::ranges::upper_bound(first, frame) - first.begin()) - 1;
+    const Eigen::VectorXd pose = curves_of(vectors_[c], d).col(frame - first[c]);
+    const Skeleton& skeleton = table_.skeletons[static_cast<std::size_t>(table_.clips[c].skeleton)];
+    parts[static_cast<std::size_t>(s)] =
+        pose_metric(skeleton, reference_, std::span(pose.data(), static_cast<std::size_t>(d)));
+  });
+  metrics_ = {Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd::Zero(d, d)};
+  for (const PoseMetric& part : parts) {
+    metrics_.positions += part.positions / static_cast<double>(samples);
+    metrics_.shell += part.shell / static_cast<double>(samples);
+  }
+}
+
+void MotionSpaceEncoder::plan(double step, const MotionSpaceSettings& settings) {
+  metric_ = metrics_.combined(settings.shell_weight);
+  exact_ = karhunen_loeve(metric_, moments_);
+  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { cut(c, step, settings); });
+  progress_.check_stop();
+  first_window_.assign(1, 0);
+  for (const ClipEntry& clip : table_.clips) first_window_.push_back(first_window_.back() + clip.blocks.size());
+  coefficients_.assign(first_window_.back(), {});
+
+  const int d = reference_.dimensions();
+  const RowMatrix analysis = exact_.basis.transpose() * metric_;  // B' M B = I
+  std::map<int, std::shared_ptr<const WindowTransform>> transforms;
+  std::vector<int> lengths;
+  for (const ClipEntry& clip : table_.clips) lengths.insert(lengths.end(), clip.blocks.begin(), clip.blocks.end());
+  std::ranges::sort(lengths);
+  lengths.erase(std::unique(lengths.begin(), lengths.end()), lengths.end());
+  std::vector<std::shared_ptr<const WindowTransform>> made(lengths.size());
+  tbb::parallel_for(std::size_t{0}, lengths.size(), [&](std::size_t i) {
+    made[i] = std::make_shared<const WindowTransform>(lengths[i], lengths[i]);
+  });
+  for (std::size_t i = 0; i < lengths.size(); ++i) transforms[lengths[i]] = made[i];
+  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+    const RowMatrix z = analysis * curves_of(vectors_[c], d);
+    int first = 0;
+    for (std::size_t b = 0; b < table_.clips[c].blocks.size(); ++b) {
+      const int points = table_.clips[c].blocks[b];
+      auto& out = coefficients_[first_window_[c] + b];
+      out.resize(static_cast<std::size_t>(d) * static_cast<std::size_t>(points));
+      transforms.at(points)->analyse(z.data() + first, z.cols(), d, out.data());
+      first += points;
+    }
+  });
+  progress_.check_stop();
+}
+
+void MotionSpaceEncoder::cut(std::size_t c, double step, const MotionSpaceSettings& settings) {
+  const int d = reference_.dimensions();
+  const int planned = std::min(planned_components, d);
+  const RowMatrix analysis = (exact_.basis.transpose() * metric_).topRows(planned) / step;
+  const RowMatrix z = analysis * curves_of(vectors_[c], d);
+  ClipEntry& clip = table_.clips[c];
+  const std::vector<int> jumps = find_jumps(z * step, vectors_[c].jumps);
+  if (settings.window_s > 0) {
+    const auto wanted = std::clamp<std::int64_t>(std::llround(settings.window_s * clip.rate_hz), 1, longest_block / 2);
+    clip.blocks.clear();
+    int first = 0;
+    for (std::size_t j = 0; j <= jumps.size(); ++j) {
+      const int last = j < jumps.size() ? jumps[j] : clip.frames;
+      const auto stretch = equal_windows(last - first, static_cast<int>(wanted));
+      clip.blocks.insert(clip.blocks.end(), stretch.begin(), stretch.end());
+      first = last;
+    }
+  } else {
+    clip.blocks = plan_blocks({z.data(), static_cast<std::size_t>(z.size())}, planned, clip.frames, clip.rate_hz, jumps,
+                              {.longest_frames = longest_block});
+  }
+  clip.finer.assign(clip.blocks.size(), 0);
+}
+
+// What coding a component takes off the squared error, in squared steps, less what its bits are worth.
+double MotionSpaceEncoder::gain_of(int component, double step) const {
+  constexpr double bits_of_value = 7;
+  constexpr double bits_of_entry = 3;
+  constexpr double worth = 0.12;
+  double gain = -worth * bits_of_entry * reference_.dimensions();
+  for (const std::vector<double>& window : coefficients_) {
+    const std::size_t points = window.size() / static_cast<std::size_t>(reference_.dimensions());
+    for (std::size_t k = 0; k < points; ++k) {
+      const double size = std::abs(window[static_cast<std::size_t>(component) * points + k]) / step;
+      if (size > unlikely) gain += size * size - 1.0 / 12 - worth * bits_of_value;
+    }
+  }
+  return gain;
+}
+
+void MotionSpaceEncoder::choose_basis(double step, double shell_weight, MotionSpaceTables& tables,
+                                      Eigen::MatrixXd& mixing) const {
+  const int d = reference_.dimensions();
+  std::vector<double> gains(static_cast<std::size_t>(d));
+  tbb::parallel_for(0, d, [&](int c) { gains[static_cast<std::size_t>(c)] = gain_of(c, step); });
+  std::vector<int> kept;
+  for (int c = 0; c < d; ++c) {
+    if (gains[static_cast<std::size_t>(c)] > 0) kept.push_back(c);
+  }
+  Eigen::MatrixXd basis(d, static_cast<Eigen::Index>(kept.size()));
+  std::vector<int> exponents;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    basis.col(static_cast<Eigen::Index>(i)) = exact_.basis.col(kept[i]);
+    const double rms = std::sqrt(exact_.energy(kept[i]));
+    exponents.push_back(std::max(coarsest_exponent, static_cast<int>(std::ceil(std::log2(std::max(rms / step, 1e-3)))) + extra_exponent));
+  }
+  const std::vector<double> rest(static_cast<std::size_t>(d), 0.0);
+  const Eigen::MatrixXd lower =
+      fixed_cholesky(pose_metric(table_.skeletons.front(), reference_, rest).lifted(shell_weight));
+  tables.basis = quantise_basis(lower.transpose() * basis, exponents);
+  const Eigen::MatrixXd sent = solve_transposed(lower, tables.basis.mixing());
+  mixing = projection_onto(sent, metric_) * exact_.basis;
+}
+
+// The state of one attempt.
+struct MotionSpaceEncoder::Coding {
+  Attempt attempt;
+  std::vector<std::vector<double>> wanted;  // by window, [component][function], in steps
+  std::vector<CodingStatistics> statistics;  // by group
+  std::vector<ClipErrorSums> errors;
+
+  [[nodiscard]] CodingStatistics total() const {
+    CodingStatistics out;
+    for (const CodingStatistics& one : statistics) out.add(one);
+    return out;
+  }
+};
+
+namespace {
+
+Spectrum spectrum_of(const CodingStatistics& statistics, int components) {
+  Spectrum out{.components = components, .level = {}};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(components) * band_count; ++i) {
+    const double count = i < statistics.coefficients.size() ? statistics.coefficients[i] : 0;
+    out.level.push_back(count > 0 ? Spectrum::level_of(statistics.magnitude[i] / count) : std::uint8_t{0});
+  }
+  return out;
+}
+
+}  // namespace
+
+void MotionSpaceEncoder::code_groups(Coding& coding, const MotionSpaceSettings& settings, bool measure) const {
+  Attempt& a = coding.attempt;
+  const auto components = static_cast<std::size_t>(a.tables.basis.components);
+  a.layout = lay_out(a.clips, a.tables.coding.spectrum, a.tables.group_frames);
+  a.groups.assign(a.layout.groups.size(), {});
+  a.largest.assign(a.layout.windows.size(), 0.0);
+  coding.statistics.assign(a.layout.groups.size(), {});
+  coding.errors.assign(a.layout.groups.size(), {});
+  const WindowSynthesis synthesis(a.tables, table_.skeletons.front());
+  tbb::parallel_for(std::size_t{0}, a.layout.groups.size(), [&](std::size_t g) {
+    if (g % static_cast<std::size_t>(settings.sample) != 0) return;
+    progress_.check_stop();
+    const WindowGroup& group = a.layout.groups[g];
+    std::vector<std::vector<double>> wanted(group.count), values(group.count);
+    std::vector<CoefficientBlock> blocks;
+    for (std::size_t i = 0; i < group.count; ++i) {
+      const WindowPlace& window = a.layout.windows[group.first + i];
+      const auto functions = static_cast<std::size_t>(window.functions);
+      const auto points = static_cast<std::size_t>(window.points);
+      wanted[i].resize(components * functions);
+      values[i].assign(components * functions, 0.0);
+      for (std::size_t c = 0; c < components; ++c) {
+        std::copy_n(coding.wanted[group.first + i].begin() + static_cast<std::ptrdiff_t>(c * points), functions,
+                    wanted[i].begin() + static_cast<std::ptrdiff_t>(c * functions));
+      }
+      blocks.push_back({window.functions, window.edges, window.follows, wanted[i], values[i]});
+    }
+    a.groups[g] = encode_group(blocks, a.tables.coding, settings.rate_weight, coding.statistics[g]);
+    if (!measure) return;
+    WindowSynthesis::Scratch scratch;
+    std::vector<double> vectors;
+    for (std::size_t i = 0; i < group.count; ++i) {
+      const WindowPlace& window = a.layout.windows[group.first + i];
+      const auto c = static_cast<std::size_t>(window.clip);
+      vectors.resize(static_cast<std::size_t>(reference_.dimensions()) * static_cast<std::size_t>(window.points));
+      synthesis.synthesise(window, values[i], vectors, scratch);
+      Clip decoded = slice(clips_[c], window.first, window.points);
+      PoseWriter(reference_, a.clips.clips[c].placement, decoded).write(vectors, 0, window.points);
+      const ClipErrorSums error = clip_error(clips_[c], decoded, window.first, window.points, 0);
+      coding.errors[g].add(error);
+      a.largest[group.first + i] = error.largest;
+    }
+  });
+  a.error = {};
+  for (const ClipErrorSums& error : coding.errors) a.error.add(error);
+}
+
+Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& settings, const Attempt* learned,
+                                    std::span<const int> finer) const {
+  Coding coding;
+  Attempt& a = coding.attempt;
+  a.clips = table_;
+  a.tables.step = step;
+  a.tables.shell_weight = settings.shell_weight;
+  a.tables.group_frames = settings.group_frames;
+  a.tables.reference = reference_;
+  Eigen::MatrixXd mixing;
+  choose_basis(step, settings.shell_weight, a.tables, mixing);
+  const int components = a.tables.basis.components;
+  for (std::size_t c = 0; c < clips_.size() && !finer.empty(); ++c) {
+    for (std::size_t b = 0; b < a.clips.clips[c].blocks.size(); ++b) a.clips.clips[c].finer[b] = finer[first_window_[c] + b];
+  }
+
+  // Scaled coefficients, and what the spectrum of their plain rounding is.
+  coding.wanted.resize(coefficients_.size());
+  std::vector<CodingStatistics> plain(clips_.size());
+  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+    CodingStatistics& s = plain[c];
+    s.magnitude.assign(static_cast<std::size_t>(components) * band_count, 0.0);
+    s.coefficients = s.magnitude;
+    const ClipEntry& clip = a.clips.clips[c];
+    for (std::size_t b = 0; b < clip.blocks.size(); ++b) {
+      const int points = clip.blocks[b];
+      const auto& exact = coefficients_[first_window_[c] + b];
+      auto& wanted = coding.wanted[first_window_[c] + b];
+      wanted.resize(static_cast<std::size_t>(components) * static_cast<std::size_t>(points));
+      Eigen::Map<RowMatrix>(wanted.data(), components, points) =
+          (finer_factor(clip.finer[b]) / step) * mixing *
+          Eigen::Map<const RowMatrix>(exact.data(), reference_.dimensions(), points);
+      const auto edges = band_edges(points, points, clip.rate_hz);
+      for (int i = 0; i < components; ++i) {
+        for (std::size_t band = 0; band < band_count; ++band) {
+          const std::size_t cell = static_cast<std::size_t>(i) * band_count + band;
+          for (int k = edges[band]; k < edges[band + 1]; ++k) {
+            const double size =
+                std::abs(wanted[static_cast<std::size_t>(i) * static_cast<std::size_t>(points) + static_cast<std::size_t>(k)]);
+            if (size > unlikely) s.magnitude[cell] += std::floor(size + 0.5);
+          }
+          s.coefficients[cell] += edges[band + 1] - edges[band];
+        }
+      }
+    }
+  });
+  CodingStatistics first;
+  for (const CodingStatistics& one : plain) first.add(one);
+  a.tables.coding.spectrum = spectrum_of(first, components);
+  if (learned != nullptr) {
+    a.tables.coding.start = learned->tables.coding.start;
+    a.tables.coding.points = learned->tables.coding.points;
+  }
+  const bool estimate = settings.sample > 1;
+  code_groups(coding, settings, estimate);
+  CodingStatistics total = coding.total();
+  if (!estimate) {
+    // Once more with what was learned.
+    a.tables.coding.spectrum = spectrum_of(total, components);
+    a.tables.coding.start = total.counts.learn();
+    a.tables.coding.points = total.reconstruction();
+    code_groups(coding, settings, true);
+  } else {
+    a.tables.coding.start = total.counts.learn();
+    a.tables.coding.points = total.reconstruction();
+  }
+  return std::move(coding.attempt);
+}
+
+ClipErrorSums MotionSpaceEncoder::error_of(std::span<const Clip> decoded) const {
+  std::vector<ClipErrorSums> parts(clips_.size());
+  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+    parts[c] = clip_error(clips_[c], decoded[c], 0, clips_[c].frames, 0);
+  });
+  ClipErrorSums out;
+  for (const ClipErrorSums& part : parts) out.add(part);
+  return out;
+}
+
+Bytes write_stream(const Attempt& attempt, const MeasuredError& error) {
+  BitstreamWriter out(stream_kind("motion-space"));
+  out.set_error(error);
+  const Bytes clips = pack_clip_table(attempt.clips);
+  const Bytes tables = pack_motion_space_tables(attempt.tables);
+  std::vector<Bytes> layers;
+  std::size_t size = clips.size() + tables.size();
+  for (std::size_t layer = 0; layer < layer_count; ++layer) {
+    ByteWriter block;
+    for (const auto& group : attempt.groups) put_varint(block, group[layer].size());
+    for (const auto& group : attempt.groups) block.put_bytes(group[layer]);
+    layers.push_back(std::move(block).take());
+    size += layers.back().size();
+  }
+  out.add_section("clips", clips);
+  out.add_section("tables", tables);
+  // A reader believes so many frames of so many bytes; motion that never moves has to make up for it.
+  const std::int64_t needed = (attempt.clips.frames() - 65536 + 255) / 256;
+  if (needed > static_cast<std::int64_t>(size)) {
+    out.add_section("padding", Bytes(static_cast<std::size_t>(needed) - size, std::byte{0}));
+  }
+  out.add_progressive_section("layers", layers);
+  return out.finish();
+}
+
+}  // namespace kinespace

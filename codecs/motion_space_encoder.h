@@ -1,0 +1,73 @@
+// The encoder of the motion-space codec, in steps that a search for a target repeats: prepare once, plan for a metric and
+// a rough step, then attempt at a step. Private to this folder.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "base/progress.h"
+#include "codecs/clip_error.h"
+#include "codecs/motion_space_tables.h"
+
+namespace kinespace {
+
+struct MotionSpaceSettings {
+  double shell_weight = 0.03;
+  double rate_weight = 0.14;  // lambda: squared steps that a bit is worth. dD/dR of white noise is 0.1155 at high rates
+  double window_s = 0;        // fixed windows of so many seconds; 0: as time_blocks.h plans
+  int group_frames = 4096;
+  int sample = 1;             // every so many groups only, for estimates
+};
+
+// The result of coding at one step.
+struct Attempt {
+  MotionSpaceTables tables;
+  ClipTable clips;
+  WindowLayout layout;
+  std::vector<std::vector<Bytes>> groups;  // [group][layer]; empty for groups that were not sampled
+  ClipErrorSums error;                     // of the groups coded
+  std::vector<double> largest;             // by window: the largest joint error, when asked for
+};
+
+class MotionSpaceEncoder {
+ public:
+  // Throws Error as Codec::encode does.
+  MotionSpaceEncoder(std::span<const Clip> clips, const Progress& progress);
+
+  // Cuts the clips into windows and transforms them, for about this step.
+  void plan(double step, const MotionSpaceSettings& settings);
+  // Codes at a step. `learned`: an attempt at a step near it, whose models are the start. `finer`: by window.
+  [[nodiscard]] Attempt attempt(double step, const MotionSpaceSettings& settings, const Attempt* learned,
+                                std::span<const int> finer = {}) const;
+  [[nodiscard]] std::size_t window_count() const { return first_window_.back(); }
+  [[nodiscard]] std::int64_t frames() const { return frames_; }
+  // Of decoded clips, in the order of those that are encoded.
+  [[nodiscard]] ClipErrorSums error_of(std::span<const Clip> decoded) const;
+
+ private:
+  struct Coding;
+  void add_moments();
+  void add_metrics();
+  void cut(std::size_t clip, double step, const MotionSpaceSettings& settings);
+  void choose_basis(double step, double shell_weight, MotionSpaceTables& tables, Eigen::MatrixXd& mixing) const;
+  [[nodiscard]] double gain_of(int component, double step) const;
+  void code_groups(Coding& coding, const MotionSpaceSettings& settings, bool measure) const;
+
+  std::span<const Clip> clips_;
+  const Progress& progress_;
+  ClipTable table_;
+  ReferencePose reference_;
+  std::vector<PoseVectors> vectors_;
+  std::int64_t frames_ = 0;
+  Eigen::MatrixXd moments_;  // mean of x x'
+  PoseMetric metrics_;       // mean over sampled poses
+  Eigen::MatrixXd metric_;
+  KarhunenLoeve exact_;
+  std::vector<std::size_t> first_window_;              // by clip, and the end
+  std::vector<std::vector<double>> coefficients_;      // by window: [component][point], all functions, exact basis
+};
+
+// The finished stream.
+[[nodiscard]] Bytes write_stream(const Attempt& attempt, const MeasuredError& error);
+
+}  // namespace kinespace

@@ -1,0 +1,181 @@
+// Decoding of motion-space streams.
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "base/error.h"
+#include "codecs/motion_space_codec.h"
+#include "codecs/motion_space_tables.h"
+#include "codecs/registry.h"
+#include "storage/varint.h"
+
+namespace kinespace {
+namespace {
+
+// One layer of the stream: a code for each group.
+std::vector<std::span<const std::byte>> split_layer(std::span<const std::byte> layer, std::size_t groups,
+                                                    const std::string& source) {
+  ByteReader in(layer, source);
+  std::vector<std::size_t> sizes;
+  for (std::size_t g = 0; g < groups; ++g) sizes.push_back(get_count(in, 1, "bytes of a group"));
+  std::vector<std::span<const std::byte>> out;
+  for (const std::size_t size : sizes) out.push_back(in.take(size));
+  in.expect_end();
+  return out;
+}
+
+class MotionSpaceReader final : public StreamReader {
+ public:
+  explicit MotionSpaceReader(Bitstream stream)
+      : stream_(std::move(stream)),
+        table_(unpack_clip_table(stream_.section("clips"), most_frames(), stream_.source())),
+        tables_(unpack_motion_space_tables(stream_.section("tables"),
+                                           static_cast<int>(table_.skeletons.front().rotating_joints().size()),
+                                           stream_.source())),
+        layout_(lay_out(table_, tables_.coding.spectrum, tables_.group_frames)),
+        synthesis_(tables_, table_.skeletons.front()) {
+    const auto blocks = stream_.blocks("layers");
+    if (blocks.size() > layer_count) {
+      throw Error(ErrorKind::bad_input, {.file = stream_.source(),
+                                         .found = fmt::format("{} layers", blocks.size()),
+                                         .expected = fmt::format("at most {}", layer_count)});
+    }
+    layers_.resize(layout_.groups.size());
+    for (const auto block : blocks) {
+      const auto parts = split_layer(block, layout_.groups.size(), stream_.source());
+      for (std::size_t g = 0; g < parts.size(); ++g) layers_[g].push_back(parts[g]);
+    }
+    levels_ = static_cast<int>(blocks.size());
+    for (const ClipEntry& clip : table_.clips) summaries_.push_back({clip.name, clip.rate_hz, clip.frames});
+  }
+
+  [[nodiscard]] const Bitstream& stream() const override { return stream_; }
+  [[nodiscard]] std::span<const ClipSummary> clips() const override { return summaries_; }
+  [[nodiscard]] const Skeleton& skeleton(std::size_t clip) const override {
+    return table_.skeletons[static_cast<std::size_t>(table_.clips[clip].skeleton)];
+  }
+  [[nodiscard]] int levels() const override { return levels_; }
+
+  [[nodiscard]] Clip decode(std::size_t clip, int first, int count, int level) const override {
+    check_range(clip, first, count);
+    const ClipEntry& entry = table_.clips[clip];
+    // From the first window that is needed to the last.
+    std::size_t begin = layout_.first_of_clip[clip];
+    while (layout_.windows[begin].first + layout_.windows[begin].points <= first) ++begin;
+    std::size_t end = begin;
+    while (end < layout_.first_of_clip[clip + 1] && layout_.windows[end].first < first + count) ++end;
+    const int decoded_first = layout_.windows[begin].first;
+    const WindowPlace& last = layout_.windows[end - 1];
+    Clip out = empty_clip(entry, decoded_first, last.first + last.points - decoded_first);
+    for (std::size_t g = 0; g < layout_.groups.size(); ++g) {
+      const WindowGroup& group = layout_.groups[g];
+      const std::size_t from = std::max(begin, group.first);
+      const std::size_t to = std::min(end, group.first + group.count);
+      if (from >= to) continue;
+      const GroupValues values = decode_values(g, to - group.first, level);
+      PoseWriter writer(tables_.reference, entry.placement, out);
+      for (std::size_t w = from; w < to; ++w) write_window(values, w - group.first, w, decoded_first, writer);
+    }
+    if (decoded_first == first && out.frames == count) return out;
+    return slice(out, first - decoded_first, count);
+  }
+
+  [[nodiscard]] std::vector<Clip> decode_all(int level) const override {
+    std::vector<Clip> out(table_.clips.size());
+    tbb::parallel_for(std::size_t{0}, out.size(),
+                      [&](std::size_t c) { out[c] = empty_clip(table_.clips[c], 0, table_.clips[c].frames); });
+    tbb::parallel_for(std::size_t{0}, layout_.groups.size(), [&](std::size_t g) {
+      const WindowGroup& group = layout_.groups[g];
+      const GroupValues values = decode_values(g, group.count, level);
+      for (std::size_t i = 0; i < group.count; ++i) {
+        const auto clip = static_cast<std::size_t>(layout_.windows[group.first + i].clip);
+        PoseWriter writer(tables_.reference, table_.clips[clip].placement, out[clip]);
+        write_window(values, i, group.first + i, 0, writer);
+      }
+    });
+    return out;
+  }
+
+ private:
+  struct GroupValues {
+    std::vector<double> values;
+    std::vector<std::size_t> offsets;
+  };
+
+  // No more frames are believed than would fit this (an encoder pads what is smaller).
+  [[nodiscard]] std::int64_t most_frames() const { return 65536 + 256 * static_cast<std::int64_t>(stream_.size()); }
+
+  void check_range(std::size_t clip, int first, int count) const {
+    const bool there = clip < table_.clips.size() && first >= 0 && count >= 1 && first <= table_.clips[clip].frames - count;
+    if (there) return;
+    throw Error(ErrorKind::usage, {.file = stream_.source(),
+                                   .found = fmt::format("frames {} to {} of clip {}", first, first + count, clip),
+                                   .expected = "frames that the stream has"});
+  }
+
+  // With side tracks applied; of a part of a clip, of that part.
+  [[nodiscard]] Clip empty_clip(const ClipEntry& entry, int first, int count) const {
+    const Skeleton& bones = table_.skeletons[static_cast<std::size_t>(entry.skeleton)];
+    Clip out = make_clip(entry.name, bones, entry.rate_hz, count);
+    out.require_translation_track(bones.travel_root());
+    for (const SideTrack& track : entry.side_tracks) apply_side_track(track, first, out);
+    return out;
+  }
+
+  [[nodiscard]] GroupValues decode_values(std::size_t g, std::size_t windows, int level) const {
+    const WindowGroup& group = layout_.groups[g];
+    const auto components = static_cast<std::size_t>(tables_.basis.components);
+    GroupValues out;
+    for (std::size_t i = 0; i < group.count; ++i) {
+      out.offsets.push_back(out.values.size());
+      const auto functions = static_cast<std::size_t>(layout_.windows[group.first + i].functions);
+      out.values.resize(out.values.size() + components * functions, 0.0);
+    }
+    std::vector<CoefficientBlock> blocks;
+    for (std::size_t i = 0; i < group.count; ++i) {
+      const WindowPlace& window = layout_.windows[group.first + i];
+      blocks.push_back({.functions = window.functions,
+                        .edges = window.edges,
+                        .follows = window.follows,
+                        .values = std::span(out.values)
+                                      .subspan(out.offsets[i], components * static_cast<std::size_t>(window.functions))});
+    }
+    const std::size_t wanted = level < 0 ? layers_[g].size() : std::min(layers_[g].size(), static_cast<std::size_t>(level));
+    decode_group(blocks, tables_.coding, std::span(layers_[g]).first(wanted), stream_.source());
+    static_cast<void>(windows);
+    return out;
+  }
+
+  void write_window(const GroupValues& values, std::size_t in_group, std::size_t w, int decoded_first,
+                    PoseWriter& writer) const {
+    const WindowPlace& window = layout_.windows[w];
+    const auto dimensions = static_cast<std::size_t>(tables_.reference.dimensions());
+    thread_local WindowSynthesis::Scratch scratch;
+    thread_local std::vector<double> vectors;
+    vectors.resize(dimensions * static_cast<std::size_t>(window.points));
+    const std::size_t size =
+        static_cast<std::size_t>(tables_.basis.components) * static_cast<std::size_t>(window.functions);
+    synthesis_.synthesise(window, std::span(values.values).subspan(values.offsets[in_group], size), vectors, scratch);
+    writer.write(vectors, window.first - decoded_first, window.points);
+  }
+
+  Bitstream stream_;
+  ClipTable table_;
+  MotionSpaceTables tables_;
+  WindowLayout layout_;
+  WindowSynthesis synthesis_;
+  std::vector<std::vector<std::span<const std::byte>>> layers_;  // [group][layer]
+  std::vector<ClipSummary> summaries_;
+  int levels_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<StreamReader> MotionSpaceCodec::open(Bitstream stream) const {
+  stream.require_kind(stream_kind(name()));
+  return std::make_unique<MotionSpaceReader>(std::move(stream));
+}
+
+}  // namespace kinespace

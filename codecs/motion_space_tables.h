@@ -1,0 +1,89 @@
+// What all clips of a motion-space stream share, and the way from decoded coefficients to pose vectors.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "codecs/clip_table.h"
+#include "codecs/coefficient_coder.h"
+#include "codecs/joint_basis.h"
+#include "codecs/natural_functions.h"
+#include "codecs/pose_vectors.h"
+
+namespace kinespace {
+
+struct MotionSpaceTables {
+  double step = 1;          // of the quantiser: cm times the square root of the number of joints
+  double shell_weight = 0;  // of the metric that L0 comes from (position_metric.h)
+  int group_frames = 4096;  // windows are coded in groups of at least so many frames, each decodable alone
+  ReferencePose reference;
+  JointBasis basis;
+  CoefficientTables coding;
+};
+
+[[nodiscard]] Bytes pack_motion_space_tables(const MotionSpaceTables& tables);
+// Throws Error{bad_input} naming `source`.
+[[nodiscard]] MotionSpaceTables unpack_motion_space_tables(std::span<const std::byte> bytes, int rotating_joints,
+                                                           const std::string& source);
+
+// One window of one clip in the stream.
+struct WindowPlace {
+  int clip = 0;
+  int first = 0;  // frame of the clip
+  int points = 0;
+  int finer = 0;
+  bool follows = false;  // the window before it in the group is of the same clip
+  std::array<int, band_count + 1> edges{};
+  int functions = 0;
+};
+// A run of windows that is coded by itself.
+struct WindowGroup {
+  std::size_t first = 0;
+  std::size_t count = 0;
+};
+struct WindowLayout {
+  std::vector<WindowPlace> windows;  // clip by clip
+  std::vector<WindowGroup> groups;
+  std::vector<std::size_t> first_of_clip;  // and the end
+};
+[[nodiscard]] WindowLayout lay_out(const ClipTable& table, const Spectrum& spectrum, int group_frames);
+
+// Tables of natural functions by size, made when first needed; forgotten when they take more than 32 MiB. Safe from
+// several threads.
+class FunctionTables {
+ public:
+  [[nodiscard]] std::shared_ptr<const NaturalFunctions> get(int points, int functions);
+
+ private:
+  std::mutex mutex_;
+  std::map<std::pair<int, int>, std::shared_ptr<const NaturalFunctions>> tables_;
+  std::size_t bytes_ = 0;
+};
+
+// From coefficients in quantiser steps to pose vectors. Same bits on every machine.
+class WindowSynthesis {
+ public:
+  // `skeleton`: the first of the stream.
+  WindowSynthesis(const MotionSpaceTables& tables, const Skeleton& skeleton);
+
+  [[nodiscard]] const Eigen::MatrixXd& basis() const { return basis_; }  // B, dimensions x components
+
+  struct Scratch {
+    std::vector<double> coefficients;
+  };
+  // values: [component][functions]; out: [dimension][points].
+  void synthesise(const WindowPlace& window, std::span<const double> values, std::span<double> out,
+                  Scratch& scratch) const;
+
+ private:
+  Eigen::MatrixXd basis_;
+  double step_;
+  std::unique_ptr<FunctionTables> functions_ = std::make_unique<FunctionTables>();
+};
+
+}  // namespace kinespace

@@ -1,0 +1,124 @@
+#include "codecs/registry.h"
+
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "codecs/motion_space_codec.h"
+
+namespace kinespace {
+namespace {
+
+constexpr std::string_view kind_prefix = "codec:";
+
+void require_positive(const char* field, double value) {
+  if (value > 0 && std::isfinite(value)) return;
+  throw Error(ErrorKind::usage, {.found = fmt::format("CodecTarget::{} = {}", field, value), .expected = "more than 0"});
+}
+
+void check_settings(const Codec& codec, const CodecOptions& options) {
+  for (const auto& [name, value] : options.settings) {
+    const CodecSetting* found = nullptr;
+    std::string names;
+    for (const CodecSetting& setting : codec.settings()) {
+      if (setting.name == name) found = &setting;
+      names += fmt::format("{}{}", names.empty() ? "" : ", ", setting.name);
+    }
+    if (found == nullptr) {
+      throw Error(ErrorKind::usage, {.found = fmt::format("setting {} of codec {}", name, codec.name()),
+                                     .expected = names.empty() ? "no settings" : names});
+    }
+    if (!(value >= found->least && value <= found->most)) {
+      throw Error(ErrorKind::usage, {.found = fmt::format("{} = {}", name, value),
+                                     .expected = fmt::format("{} to {}", found->least, found->most)});
+    }
+  }
+}
+
+void check_clips(std::span<const Clip> clips) {
+  if (clips.empty()) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "at least one"});
+  for (const Clip& clip : clips) {
+    if (clip.frames >= 1 && clip.rate_hz > 0 && std::isfinite(clip.rate_hz)) continue;
+    throw Error(ErrorKind::bad_input, {.file = clip.name,
+                                       .found = fmt::format("{} frames at {} Hz", clip.frames, clip.rate_hz),
+                                       .expected = "at least one frame and a rate above 0"});
+  }
+}
+
+}  // namespace
+
+void CodecTarget::validate() const {
+  if (mean_error_cm) require_positive("mean_error_cm", *mean_error_cm);
+  if (max_error_cm) require_positive("max_error_cm", *max_error_cm);
+  if (bytes) require_positive("bytes", static_cast<double>(*bytes));
+  const int given = (mean_error_cm ? 1 : 0) + (max_error_cm ? 1 : 0) + (bytes ? 1 : 0);
+  if (given > 1) {
+    throw Error(ErrorKind::usage, {.found = fmt::format("{} targets", given),
+                                   .expected = "one of mean_error_cm, max_error_cm and bytes"});
+  }
+}
+
+std::size_t StreamReader::find(std::string_view name) const {
+  for (std::size_t i = 0; i < clips().size(); ++i) {
+    if (clips()[i].name == name) return i;
+  }
+  throw Error(ErrorKind::usage, {.file = stream().source(),
+                                 .found = fmt::format("no clip named {}", name),
+                                 .expected = "one of those that `kinespace info` lists"});
+}
+
+double Codec::setting(const CodecOptions& options, std::string_view name) const {
+  const auto given = options.settings.find(name);
+  if (given != options.settings.end()) return given->second;
+  for (const CodecSetting& setting : settings()) {
+    if (setting.name == name) return setting.initial;
+  }
+  throw Error(ErrorKind::usage, {.found = fmt::format("no setting {}", name), .expected = "one of the codec's"});
+}
+
+std::span<const Codec* const> all_codecs() {
+  static const MotionSpaceCodec motion_space;
+  static const std::array<const Codec*, 1> codecs{&motion_space};
+  return codecs;
+}
+
+const Codec& find_codec(std::string_view name) {
+  std::string names;
+  for (const Codec* codec : all_codecs()) {
+    if (codec->name() == name) return *codec;
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", codec->name());
+  }
+  throw Error(ErrorKind::usage, {.found = fmt::format("codec {}", name), .expected = names});
+}
+
+std::string stream_kind(std::string_view codec) {
+  return fmt::format("{}{}", kind_prefix, codec);
+}
+
+Bytes encode(std::string_view codec, std::span<const Clip> clips, const CodecOptions& options) {
+  const Codec& found = find_codec(codec);
+  options.target.validate();
+  check_settings(found, options);
+  check_clips(clips);
+  return found.encode(clips, options);
+}
+
+bool is_clip_stream(std::span<const std::byte> bytes) {
+  if (!Bitstream::has_magic(bytes)) return false;
+  return Bitstream::parse_prefix(bytes, "").kind().starts_with(kind_prefix);
+}
+
+std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std::string source) {
+  Bitstream stream = Bitstream::parse_prefix(bytes, std::move(source));
+  const std::string kind = stream.kind();
+  for (const Codec* codec : all_codecs()) {
+    if (kind == stream_kind(codec->name())) return codec->open(std::move(stream));
+  }
+  throw Error(ErrorKind::bad_input, {.file = stream.source(),
+                                     .found = "a stream of kind " + kind,
+                                     .expected = "a stream of clips by a codec that this build knows"});
+}
+
+}  // namespace kinespace

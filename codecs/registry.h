@@ -1,0 +1,28 @@
+// Codecs by their name. A new codec is a file pair with a class of Codec, and one line in registry.cpp.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "codecs/codec.h"
+
+namespace kinespace {
+
+[[nodiscard]] std::span<const Codec* const> all_codecs();
+// Throws Error{usage} naming those there are.
+[[nodiscard]] const Codec& find_codec(std::string_view name);
+// The kind of that codec's streams.
+[[nodiscard]] std::string stream_kind(std::string_view codec);
+
+// Checks clips and options, then encodes.
+[[nodiscard]] Bytes encode(std::string_view codec, std::span<const Clip> clips, const CodecOptions& options = {});
+
+// Whether the bytes are a stream of clips, whole or the beginning of one.
+[[nodiscard]] bool is_clip_stream(std::span<const std::byte> bytes);
+// Opens a stream by the codec that made it; one that was cut short inside its levels of detail opens too. The bytes must
+// outlive the reader. Throws Error{bad_input}.
+[[nodiscard]] std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std::string source);
+
+}  // namespace kinespace

@@ -1,0 +1,168 @@
+#include "codecs/time_blocks.h"
+
+#include <algorithm>
+#include <array>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include <Eigen/Cholesky>
+
+#include "codecs/natural_functions.h"
+#include "motion/simd.h"
+
+namespace kinespace {
+namespace {
+
+// Functions of one parity: numbers 0, 2, 4 .. or 1, 3, 5 ..; on the first half of the points.
+Eigen::MatrixXd half_functions(const NaturalFunctions& functions, int parity) {
+  const int n = functions.points();
+  const int half = (n + 1) / 2;
+  const int count = (functions.count() + 1 - parity) / 2;
+  Eigen::MatrixXd out(half, count);
+  for (int i = 0; i < count; ++i) {
+    const std::vector<double> f = functions.function(2 * i + parity);
+    out.col(i) = Eigen::Map<const Eigen::VectorXd>(f.data(), half);
+  }
+  return out;
+}
+
+// The fit of one parity: coefficients = table' * folded curve, table is [half][count].
+Eigen::MatrixXd half_fit(const NaturalFunctions& functions, int parity) {
+  const Eigen::MatrixXd f = half_functions(functions, parity);
+  if (f.cols() == 0) return f;
+  // Mirrored pairs count twice, the middle of an odd number of points once.
+  Eigen::VectorXd weight = Eigen::VectorXd::Constant(f.rows(), 2);
+  if (functions.points() % 2 == 1) weight(f.rows() - 1) = 1;
+  const Eigen::MatrixXd gram = f.transpose() * weight.asDiagonal() * f;
+  return gram.llt().solve(f.transpose()).transpose();
+}
+
+KINESPACE_VECTOR_CLONES void add_scaled(const double* row, double a, double* sum, std::size_t n) {
+  for (std::size_t k = 0; k < n; ++k) sum[k] += a * row[k];
+}
+
+// The windows' lengths in grid steps that are tried; a window of m steps begins at multiples of about m / 4.
+constexpr std::array<int, 12> tried{1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32};
+
+double bits_of(std::span<const double> coefficients) {
+  double out = 0;
+  for (const double c : coefficients) {
+    const double size = std::abs(c);
+    if (size > 0.5) out += 1.5 * std::log2(1 + size);
+  }
+  return out;
+}
+
+// One stretch without jumps.
+class StretchPlan {
+ public:
+  StretchPlan(std::span<const double> curves, int curve_count, int frames, double rate_hz, const BlockPlanOptions& options)
+      : curves_(curves), curve_count_(curve_count), frames_(frames), rate_hz_(rate_hz), options_(options) {}
+
+  void plan(int first, int last, std::vector<int>& lengths) {
+    const int grid = std::clamp(static_cast<int>(std::lround(options_.grid_s * rate_hz_)), 1, options_.longest_frames);
+    const int total = last - first;
+    const int steps = (total + grid - 1) / grid;
+    std::vector<double> best(static_cast<std::size_t>(steps) + 1, std::numeric_limits<double>::infinity());
+    std::vector<int> from(static_cast<std::size_t>(steps) + 1, 0);
+    best[0] = 0;
+    for (int start = 0; start < steps; ++start) {
+      const double before = best[static_cast<std::size_t>(start)];
+      if (!std::isfinite(before)) continue;
+      for (const int m : tried) {
+        const int end = std::min(start + m, steps);
+        const bool aligned = start % std::max(1, m / 4) == 0 || end == steps;
+        const int length = std::min(end * grid, total) - start * grid;
+        if (length > options_.longest_frames || (!aligned && m > 1)) continue;
+        const double price = before + window_bits(first + start * grid, length);
+        if (price < best[static_cast<std::size_t>(end)]) {
+          best[static_cast<std::size_t>(end)] = price;
+          from[static_cast<std::size_t>(end)] = start;
+        }
+        if (end == steps) break;
+      }
+    }
+    std::vector<int> reversed;
+    for (int end = steps; end > 0; end = from[static_cast<std::size_t>(end)]) {
+      reversed.push_back(std::min(end * grid, total) - from[static_cast<std::size_t>(end)] * grid);
+    }
+    lengths.insert(lengths.end(), reversed.rbegin(), reversed.rend());
+  }
+
+ private:
+  double window_bits(int first, int length) {
+    constexpr double highest_hz = 5;
+    const double k = std::ceil(2 * highest_hz * length / rate_hz_) + 2;
+    const int functions = static_cast<int>(std::min(k, static_cast<double>(length)));
+    const WindowTransform& transform = transform_for(length, functions);
+    coefficients_.resize(static_cast<std::size_t>(curve_count_) * static_cast<std::size_t>(functions));
+    transform.analyse(curves_.data() + first, frames_, curve_count_, coefficients_.data());
+    return options_.window_bits + bits_of(coefficients_);
+  }
+  const WindowTransform& transform_for(int length, int functions) {
+    const auto found = transforms_.find(length);
+    if (found != transforms_.end()) return found->second;
+    return transforms_.emplace(length, WindowTransform(length, functions)).first->second;
+  }
+
+  std::span<const double> curves_;
+  int curve_count_;
+  int frames_;
+  double rate_hz_;
+  const BlockPlanOptions& options_;
+  std::vector<double> coefficients_;
+  std::map<int, WindowTransform> transforms_;
+};
+
+}  // namespace
+
+std::vector<int> plan_blocks(std::span<const double> curves, int curve_count, int frames, double rate_hz,
+                             std::span<const int> jumps, const BlockPlanOptions& options) {
+  std::vector<int> out;
+  StretchPlan plan(curves, curve_count, frames, rate_hz, options);
+  int first = 0;
+  for (const int jump : jumps) {
+    plan.plan(first, jump, out);
+    first = jump;
+  }
+  plan.plan(first, frames, out);
+  return out;
+}
+
+WindowTransform::WindowTransform(int points, int functions) : points_(points), functions_(functions) {
+  assert(functions >= 1 && functions <= points);
+  const NaturalFunctions natural(points, functions);
+  const Eigen::MatrixXd even = half_fit(natural, 0);
+  const Eigen::MatrixXd odd = half_fit(natural, 1);
+  // [point][even functions, then odd functions]
+  table_.reserve(static_cast<std::size_t>(even.size() + odd.size()));
+  for (Eigen::Index t = 0; t < even.rows(); ++t) {
+    for (Eigen::Index k = 0; k < even.cols(); ++k) table_.push_back(even(t, k));
+    for (Eigen::Index k = 0; k < odd.cols(); ++k) table_.push_back(odd(t, k));
+  }
+}
+
+void WindowTransform::analyse(const double* curves, std::ptrdiff_t stride, int curve_count, double* out) const {
+  const auto n = static_cast<std::size_t>(points_);
+  const auto functions = static_cast<std::size_t>(functions_);
+  const std::size_t evens = (functions + 1) / 2;
+  const std::size_t odds = functions - evens;
+  std::vector<double> sums(functions);
+  for (int c = 0; c < curve_count; ++c) {
+    const double* curve = curves + c * stride;
+    std::ranges::fill(sums, 0.0);
+    for (std::size_t t = 0; t < (n + 1) / 2; ++t) {
+      const double* row = table_.data() + t * functions;
+      const bool middle = 2 * t + 1 == n;
+      const double mirror = curve[n - 1 - t];
+      add_scaled(row, middle ? curve[t] : curve[t] + mirror, sums.data(), evens);
+      if (!middle) add_scaled(row + evens, curve[t] - mirror, sums.data() + evens, odds);
+    }
+    double* target = out + static_cast<std::size_t>(c) * functions;
+    for (std::size_t k = 0; k < functions; ++k) target[k] = k % 2 == 0 ? sums[k / 2] : sums[evens + k / 2];
+  }
+}
+
+}  // namespace kinespace
