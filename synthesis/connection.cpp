@@ -10,19 +10,26 @@
 
 #include "base/error.h"
 #include "fpca/alignment.h"
+#include "motion/simd.h"
+#include "synthesis/connection_detail.h"
 
 namespace kinespace {
 namespace {
 
 constexpr int fine_points = 1025;
 constexpr int function_points = 129;
-constexpr int stretch_points = 97;     // a stretch is scored at so many points
+constexpr int bound_cells = connection_bound_cells;
+constexpr int points_per_cell = 4;
+constexpr int stretch_points = bound_cells * points_per_cell + 1;  // a stretch is scored at so many points
 constexpr int overlap_points = 32;     // of the integral over an overlap
 constexpr double least_overlap = 0.1;  // |S| that is tabulated
 constexpr double least_speed = 0.5, largest_speed = 2;
 constexpr int scales_per_octave = 4, octaves = 3;  // u from 1/8 to 8
 constexpr double shift_steps = 40;                 // per unit of the faster clock
 constexpr int minima_refined = 5;
+constexpr double worth_refining = 2;  // cells that cost so many times the best are left
+constexpr int refinements = 6;
+constexpr int most_functions = 64;
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
 struct Interval {
@@ -74,6 +81,26 @@ SampleMatrix orthonormal_functions(const MotionSpace& space, int count) {
   return root.cwiseInverse().asDiagonal() * q;
 }
 
+// K functions at the points of an overlap, [function][point].
+using PointFunctions = std::array<float, static_cast<std::size_t>(most_functions) * overlap_points>;
+
+// sum over points of a' S b, S column-major: along the points, so that it vectorises.
+KINESPACE_VECTOR_CLONES
+float form_sum(const float* form, const float* a, const float* b, Eigen::Index count) {
+  float total[overlap_points] = {};
+  for (Eigen::Index c = 0; c < count; ++c) {
+    float product[overlap_points] = {};
+    for (Eigen::Index r = 0; r < count; ++r) {
+      const float factor = form[c * count + r];
+      for (int p = 0; p < overlap_points; ++p) product[p] += factor * a[r * overlap_points + p];
+    }
+    for (int p = 0; p < overlap_points; ++p) total[p] += product[p] * b[c * overlap_points + p];
+  }
+  float sum = 0;
+  for (const float at_point : total) sum += at_point;
+  return sum;
+}
+
 // Metres per unit of each invariant curve.
 Eigen::RowVectorXd invariant_weights(const Skeleton& skeleton) {
   const Eigen::RowVectorXd weights = curve_weights(skeleton);
@@ -94,31 +121,44 @@ Eigen::RowVectorXd invariant_reference(const MotionSpace& space) {
   return out;
 }
 
+// The poses in the middle of the cells of a stretch, and how far the motion gets from them within a cell.
+void add_poses(const SampleMatrix& curves, ConnectionMotion& motion) {
+  motion.poses.resize(bound_cells, curves.cols());
+  motion.spread.resize(bound_cells);
+  for (int i = 0; i < bound_cells; ++i) {
+    const Eigen::Index middle = i * points_per_cell + points_per_cell / 2;
+    motion.poses.row(i) = curves.row(middle).cast<float>();
+    motion.spread(i) = static_cast<float>((curves.middleRows(i * points_per_cell, points_per_cell + 1).rowwise() - curves.row(middle))
+                                              .rowwise()
+                                              .norm()
+                                              .maxCoeff());
+  }
+}
+
 }  // namespace
 
 void ConnectionOptions::validate() const {
-  const auto fail = [](const std::string& found, const char* expected) {
+  const auto fail = [](const std::string& found, const std::string& expected) {
     throw Error(ErrorKind::usage, {.found = found, .expected = expected});
   };
   if (!(window_s > 0.1 && window_s <= 20)) fail(fmt::format("window_s = {}", window_s), "above 0.1, up to 20");
   if (!(shortest_s >= 0.1 && shortest_s <= window_s)) {
     fail(fmt::format("shortest_s = {}", shortest_s), "from 0.1 to window_s");
   }
-  if (functions < 4 || functions > 64) fail(fmt::format("functions = {}", functions), "from 4 to 64");
+  if (functions < 4 || functions > most_functions) fail(fmt::format("functions = {}", functions), fmt::format("from 4 to {}", most_functions));
 }
 
 // The forms in the scores that E is made of, apart for rates and the rest.
 struct ConnectionSpace::Forms {
   const ConnectionMotion* first;
   const ConnectionMotion* second;
-  Eigen::MatrixXf cross_rates, cross_rest;
+  Eigen::MatrixXf cross_rates, cross_rest, own_of_second;
 
   [[nodiscard]] double speed(double u) const { return speed_of(*first, *second, u); }
   [[nodiscard]] Eigen::MatrixXf own_of_first(float speed) const {
     return speed * speed * first->rates + first->rest;
   }
   [[nodiscard]] Eigen::MatrixXf cross(float speed) const { return speed * cross_rates + cross_rest; }
-  [[nodiscard]] Eigen::MatrixXf own_of_second() const { return second->rates + second->rest; }
 };
 
 ConnectionSpace::ConnectionSpace(const MotionSpace& space, const ConnectionOptions& options)
@@ -176,13 +216,13 @@ void ConnectionSpace::tabulate() {
   }
 }
 
-void ConnectionSpace::interpolate(double x, float* out) const {
+void ConnectionSpace::interpolate(double x, float* out, Eigen::Index step) const {
   const double at = std::clamp(x, 0.0, 1.0) * (fine_points - 1);
   const auto i = std::min(static_cast<Eigen::Index>(at), static_cast<Eigen::Index>(fine_points - 2));
   const auto b = static_cast<float>(at - static_cast<double>(i));
   const float* low = fine_.row(i).data();
   const float* high = low + fine_.cols();
-  for (Eigen::Index k = 0; k < fine_.cols(); ++k) out[k] = (1 - b) * low[k] + b * high[k];
+  for (Eigen::Index k = 0; k < fine_.cols(); ++k) out[k * step] = (1 - b) * low[k] + b * high[k];
 }
 
 ConnectionMotion ConnectionSpace::stretch_of(const CurveSampler& clip, double start_s, double length_s) const {
@@ -204,8 +244,7 @@ ConnectionMotion ConnectionSpace::stretch_of(const CurveSampler& clip, double st
 
   ConnectionMotion out{.start_s = start_s, .length_s = length_s, .scores = scores.cast<float>()};
   const SampleMatrix curves = functions * scores;
-  out.least = curves.colwise().minCoeff().cast<float>();
-  out.largest = curves.colwise().maxCoeff().cast<float>();
+  add_poses(curves.rightCols(weights_.size() - InvariantPose::rates), out);
   const auto rates = out.scores.leftCols(InvariantPose::rates);
   const auto rest = out.scores.rightCols(weights_.size() - InvariantPose::rates);
   out.rates = rates * rates.transpose();
@@ -230,22 +269,24 @@ ConnectionSpace::Forms ConnectionSpace::forms(const ConnectionMotion& first, con
           .second = &second,
           .cross_rates = first.scores.leftCols(InvariantPose::rates) *
                          second.scores.leftCols(InvariantPose::rates).transpose(),
-          .cross_rest = first.scores.rightCols(rest) * second.scores.rightCols(rest).transpose()};
+          .cross_rest = first.scores.rightCols(rest) * second.scores.rightCols(rest).transpose(),
+          .own_of_second = second.rates + second.rest};
 }
 
 double ConnectionSpace::evaluate(const Forms& forms, double u, double v) const {
   const Interval s = overlap_of(u, v);
-  const auto count = functions_.cols();
-  Eigen::Matrix<float, Eigen::Dynamic, overlap_points> of_first(count, overlap_points), of_second(count, overlap_points);
+  const Eigen::Index count = functions_.cols();
+  PointFunctions of_first{}, of_second{};
   for (int p = 0; p < overlap_points; ++p) {
     const double at = s.begin + s.length() * (p + 0.5) / overlap_points;
-    interpolate(u * at + v, of_first.col(p).data());
-    interpolate(at, of_second.col(p).data());
+    interpolate(u * at + v, of_first.data() + p, overlap_points);
+    interpolate(at, of_second.data() + p, overlap_points);
   }
   const auto speed = static_cast<float>(forms.speed(u));
-  const float sum = (forms.own_of_first(speed) * of_first).cwiseProduct(of_first).sum() -
-                    2 * (forms.cross(speed) * of_second).cwiseProduct(of_first).sum() +
-                    (forms.own_of_second() * of_second).cwiseProduct(of_second).sum();
+  const Eigen::MatrixXf own_of_first = forms.own_of_first(speed), cross = forms.cross(speed);
+  const float sum = form_sum(own_of_first.data(), of_first.data(), of_first.data(), count) -
+                    2 * form_sum(cross.data(), of_first.data(), of_second.data(), count) +
+                    form_sum(forms.own_of_second.data(), of_second.data(), of_second.data(), count);
   return std::max(0.0, static_cast<double>(sum) / overlap_points);
 }
 
@@ -256,17 +297,6 @@ double ConnectionSpace::cost(const ConnectionMotion& first, const ConnectionMoti
   if (!(u > 0) || !legal_speed(speed_of(first, second, u))) return infinite;
   if (overlap_of(u, v).length() < least_overlap_of(first, second, u, shortest) - rounding) return infinite;
   return evaluate(forms(first, second), u, v);
-}
-
-double ConnectionSpace::lower_bound_cm(const ConnectionMotion& first, const ConnectionMotion& second) const {
-  // Rates of the first are played at any legal speed.
-  Eigen::RowVectorXf least = first.least, largest = first.largest;
-  for (Eigen::Index c = 0; c < InvariantPose::rates; ++c) {
-    least(c) *= static_cast<float>(least(c) < 0 ? largest_speed : least_speed);
-    largest(c) *= static_cast<float>(largest(c) > 0 ? largest_speed : least_speed);
-  }
-  const auto gap = (least - second.largest).cwiseMax(second.least - largest).cwiseMax(0);
-  return 100 * static_cast<double>(gap.norm());
 }
 
 namespace {
@@ -280,7 +310,7 @@ struct LegalPoint {
 }  // namespace
 
 std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first, const ConnectionMotion& second,
-                                                   double shortest_s) const {
+                                                   double shortest_s, double give_up_cm) const {
   const double shortest = shortest_s > 0 ? shortest_s : options_.shortest_s;
   const double even = std::log2(second.length_s / first.length_s);  // log u at which both play at the same speed
   const Interval scales{std::max(even - 1, -static_cast<double>(octaves)), std::min(even + 1, static_cast<double>(octaves))};
@@ -299,7 +329,6 @@ std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first
   };
   std::vector<Minimum> minima;
   Eigen::VectorXf form(2 * packed + count * count);
-  const Eigen::MatrixXf second_own = parts.own_of_second();
   Eigen::VectorXf costs;
   for (const Cells& cells : table_) {
     const double log_u = std::log2(cells.u);
@@ -312,7 +341,7 @@ std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first
     const Eigen::MatrixXf first_own = parts.own_of_first(speed);
     const Eigen::MatrixXf cross = parts.cross(speed);
     Eigen::Index at = 0;
-    for (const auto* own : {&first_own, &second_own}) {
+    for (const auto* own : {&first_own, &parts.own_of_second}) {
       for (Eigen::Index c = 0; c < count; ++c, at += c) form.segment(at, c + 1) = own->col(c).head(c + 1);
     }
     form.tail(count * count) = cross.reshaped();
@@ -332,6 +361,8 @@ std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first
     minima.push_back({infinite, {log_u, 0.5}});
   }
   std::ranges::stable_sort(minima, {}, &Minimum::cost);
+  const double least_cm = 100 * std::sqrt(std::max(minima.front().cost, 0.0));
+  if (std::isfinite(least_cm) && least_cm > 1.4 * give_up_cm) return std::nullopt;
 
   // Descent along the two coordinates, with steps that halve: the box holds all that is legal.
   const auto shift_at = [&](const LegalPoint& point) {
@@ -345,7 +376,7 @@ std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first
   Minimum best{infinite, {}};
   std::vector<LegalPoint> tried;
   for (const Minimum& start : minima) {
-    if (tried.size() == minima_refined) break;
+    if (tried.size() == minima_refined || (start.cost < infinite && start.cost > worth_refining * minima.front().cost)) break;
     const bool near = std::ranges::any_of(tried, [&](const LegalPoint& other) {
       return std::abs(other.log_u - start.at.log_u) < 0.6 && std::abs(other.share - start.at.share) < 0.06;
     });
@@ -353,7 +384,7 @@ std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first
     tried.push_back(start.at);
     Minimum here{value_at(start.at), start.at};
     double scale_step = 0.5 / scales_per_octave, share_step = 0.5 / shift_steps;
-    for (int round = 0; round < 7; ++round) {
+    for (int round = 0; round < refinements; ++round) {
       bool moved = true;
       for (int tries = 0; moved && tries < 4; ++tries) {
         moved = false;

@@ -23,7 +23,9 @@
 // times the speed of motion 2.
 #pragma once
 
+#include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -47,8 +49,8 @@ struct ConnectionMotion {
   double start_s = 0;      // of the clip
   double length_s = 0;     // L
   Eigen::MatrixXf scores;  // K x C, each curve times its w_c
-  // What bounds a connection from below: least and largest value of each weighted curve.
-  Eigen::RowVectorXf least, largest;
+  Eigen::MatrixXf poses;   // weighted curves that are no rates, [bound cell][curve]: what bounds a connection from below
+  Eigen::VectorXf spread;  // how far the motion gets from that pose within the cell
   Eigen::MatrixXf rates, rest;  // K x K: the motion's own parts of S, of curves that are rates and of the rest
 };
 
@@ -79,16 +81,15 @@ class ConnectionSpace {
   [[nodiscard]] bool long_enough(double duration_s) const { return duration_s / 2 >= options_.shortest_s; }
 
   // The best connection over the whole legal range, in which the overlap lasts `shortest_s` (that of the options when
-  // 0) or longer; none when there is no legal (u, v).
-  [[nodiscard]] std::optional<Connection> connect(const ConnectionMotion& first, const ConnectionMotion& second,
-                                                  double shortest_s = 0) const;
+  // 0) or longer; none when there is no legal (u, v). Costs above `give_up_cm` are of no interest: none as well when
+  // the grid has nothing within 1.4 times of that.
+  [[nodiscard]] std::optional<Connection> connect(
+      const ConnectionMotion& first, const ConnectionMotion& second, double shortest_s = 0,
+      double give_up_cm = std::numeric_limits<double>::infinity()) const;
 
   // E(u, v) of eq. 15, in square metres, for one (u, v); infinity where it is not legal.
   [[nodiscard]] double cost(const ConnectionMotion& first, const ConnectionMotion& second, double u, double v,
                             double shortest_s = 0) const;
-  // No connection of the two costs less (sqrt(E) in cm).
-  [[nodiscard]] double lower_bound_cm(const ConnectionMotion& first, const ConnectionMotion& second) const;
-
   [[nodiscard]] const ConnectionOptions& options() const { return options_; }
   // [point][function]: K functions on a regular grid over [0, 1], orthonormal.
   [[nodiscard]] const SampleMatrix& functions() const { return functions_; }
@@ -102,7 +103,7 @@ class ConnectionSpace {
   };
   struct Forms;
   void tabulate();
-  void interpolate(double x, float* out) const;
+  void interpolate(double x, float* out, Eigen::Index step = 1) const;  // out[k * step]
   [[nodiscard]] Forms forms(const ConnectionMotion& first, const ConnectionMotion& second) const;
   [[nodiscard]] double evaluate(const Forms& forms, double u, double v) const;
 
@@ -112,6 +113,29 @@ class ConnectionSpace {
   SampleMatrix functions_;
   Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> fine_;  // the functions, finely
   std::vector<Cells> table_;
+};
+
+// Bounds from below what connections cost, so that hopeless pairs need not be tried. The integrand of E is at least the
+// squared distance of the nearest two poses, so that E is at least the least mean of min_t |f1(t) - f2(s)|^2 over a
+// legal stretch of s, and the same with the motions changed over. Poses are compared along the main axes of all
+// motions, with what these leave of each pose as one more coordinate: distances only become smaller.
+class ConnectionBounds {
+ public:
+  // Of motions of one space; they need not live on.
+  ConnectionBounds(const ConnectionOptions& options, std::span<const ConnectionMotion* const> firsts,
+                   std::span<const ConnectionMotion* const> seconds);
+
+  // No connection of firsts[i] to seconds[k] costs less (sqrt(E) in cm).
+  [[nodiscard]] double cm(std::size_t first, std::size_t second) const;
+
+ private:
+  struct Track {
+    double length_s = 0;
+    Eigen::MatrixXf poses;  // [axis][cell]
+    Eigen::VectorXf squares, spread;
+  };
+  double shortest_s_;
+  std::vector<Track> firsts_, seconds_;
 };
 
 namespace reference {

@@ -1,0 +1,331 @@
+#include "synthesis/motion_graph.h"
+
+#include <algorithm>
+#include <cmath>
+#include <compare>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <queue>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "base/error.h"
+#include "synthesis/graph_bridges.h"
+#include "synthesis/interpolation.h"
+
+namespace kinespace {
+namespace {
+
+constexpr const char* artifact_kind = "motion graph";
+constexpr double arrow_cost_cm = 1;
+constexpr double second_cost_cm = 0.5;
+constexpr std::size_t block = 32;  // clips that are taken in between two looks at the progress
+
+struct GraphMotion {
+  std::int64_t id = 0;
+  bool fresh = false;  // not in the graph yet
+  ConnectionMotion start, end;
+};
+
+struct Way {
+  double cost_cm = 0;
+  std::size_t other = 0;
+  auto operator<=>(const Way&) const = default;
+};
+
+// The best ways out of every motion (or into it), and what was found out on the way.
+class BestWays {
+ public:
+  BestWays(const ConnectionSpace& space, const ConnectionBounds& bounds, const std::vector<GraphMotion>& motions,
+           const MotionGraphOptions& options, bool out)
+      : space_(space), bounds_(bounds), motions_(motions), options_(options), out_(out), best_(motions.size()), tried_(motions.size()) {}
+
+  void know(std::size_t motion, Way way) { best_[motion].push_back(way); }
+  // Costs that another search found out: not computed again.
+  void use(const BestWays& other) { other_ = &other; }
+
+  void search(std::size_t motion) {
+    std::vector<Way>& best = best_[motion];
+    std::ranges::sort(best);
+    const auto keep = [&] {
+      if (best.size() > static_cast<std::size_t>(options_.connections)) best.resize(static_cast<std::size_t>(options_.connections));
+    };
+    keep();
+    std::vector<Way> bounds;
+    for (std::size_t other = 0; other < motions_.size(); ++other) {
+      if (other == motion || !(motions_[motion].fresh || motions_[other].fresh)) continue;
+      bounds.push_back({out_ ? bounds_.cm(motion, other) : bounds_.cm(other, motion), other});
+    }
+    std::ranges::sort(bounds);
+    for (const Way& bound : bounds) {
+      const bool full = best.size() == static_cast<std::size_t>(options_.connections);
+      if (bound.cost_cm > options_.largest_cost_cm || (full && bound.cost_cm > best.back().cost_cm)) break;
+      const double give_up = full ? std::min(best.back().cost_cm, options_.largest_cost_cm) : options_.largest_cost_cm;
+      const double cost = cost_of(motion, bound.other, give_up);
+      tried_[motion][bound.other] = cost;
+      if (cost > options_.largest_cost_cm) continue;
+      const Way way{cost, bound.other};
+      best.insert(std::ranges::lower_bound(best, way), way);
+      keep();
+    }
+  }
+
+  [[nodiscard]] const std::vector<Way>& of(std::size_t motion) const { return best_[motion]; }
+
+ private:
+  [[nodiscard]] const GraphMotion& leaving(std::size_t motion, std::size_t other) const {
+    return motions_[out_ ? motion : other];
+  }
+  [[nodiscard]] const GraphMotion& entered(std::size_t motion, std::size_t other) const {
+    return motions_[out_ ? other : motion];
+  }
+  [[nodiscard]] double cost_of(std::size_t motion, std::size_t other, double give_up_cm) const {
+    if (other_) {
+      const auto known = other_->tried_[other].find(motion);
+      if (known != other_->tried_[other].end() && std::isfinite(known->second)) return known->second;
+    }
+    const auto connection =
+        space_.connect(leaving(motion, other).end, entered(motion, other).start, 0, give_up_cm);
+    return connection ? connection->cost_cm : std::numeric_limits<double>::infinity();
+  }
+
+  const ConnectionSpace& space_;
+  const ConnectionBounds& bounds_;
+  const std::vector<GraphMotion>& motions_;
+  const MotionGraphOptions& options_;
+  bool out_;
+  std::vector<std::vector<Way>> best_;
+  std::vector<std::map<std::size_t, double>> tried_;
+  const BestWays* other_ = nullptr;
+};
+
+// Runs in parallel over all motions, in blocks, and tells how far it is.
+template <typename Work>
+void over_all(std::size_t count, const char* stage, const Progress& progress, const Work& work) {
+  for (std::size_t begin = 0; begin < count; begin += block) {
+    progress.check_stop();
+    progress.at(stage, static_cast<double>(begin) / static_cast<double>(count));
+    tbb::parallel_for(begin, std::min(begin + block, count), work);
+  }
+  progress.at(stage, 1);
+}
+
+// For each clip of the matrix its nearest others, by exact distance.
+std::vector<std::vector<std::size_t>> nearest_rows(const RetrievalMatrix& matrix, int neighbours) {
+  const auto count = static_cast<Eigen::Index>(matrix.clip_ids.size());
+  const Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> all(
+      matrix.values.data(), count, static_cast<Eigen::Index>(matrix.dimensions));
+  std::vector<std::vector<std::size_t>> out(matrix.clip_ids.size());
+  tbb::parallel_for(Eigen::Index{0}, count, [&](Eigen::Index i) {
+    const Eigen::VectorXf distance = (all.rowwise() - all.row(i)).rowwise().squaredNorm();
+    std::vector<std::size_t> order(static_cast<std::size_t>(count));
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::erase(order, static_cast<std::size_t>(i));
+    const auto keep = std::min(order.size(), static_cast<std::size_t>(neighbours));
+    std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(keep), {}, [&](std::size_t k) {
+      return std::pair(distance(static_cast<Eigen::Index>(k)), k);
+    });
+    order.resize(keep);
+    out[static_cast<std::size_t>(i)] = std::move(order);
+  });
+  return out;
+}
+
+bool before(const GraphArrow& a, const GraphArrow& b) {
+  return std::tuple(a.from, a.to, a.kind) < std::tuple(b.from, b.to, b.kind);
+}
+
+}  // namespace
+
+void MotionGraphOptions::validate() const {
+  const auto fail = [](const std::string& found, const char* expected) {
+    throw Error(ErrorKind::usage, {.found = found, .expected = expected});
+  };
+  if (connections < 1 || connections > 1000) fail(fmt::format("connections = {}", connections), "from 1 to 1000");
+  if (neighbours < 0 || neighbours > 1000) fail(fmt::format("neighbours = {}", neighbours), "from 0 to 1000");
+  if (!(largest_cost_cm > 0)) fail(fmt::format("largest_cost_cm = {}", largest_cost_cm), "above 0");
+  connection.validate();
+}
+
+MotionGraph MotionGraph::make(LibraryView& library, std::int64_t space_id, const MotionGraphOptions& options,
+                              const Progress& progress) {
+  options.validate();
+  const MotionSpace& space = library.space(space_id);
+  MotionGraph graph;
+  graph.options_ = options;
+  graph.key_ = space.skeleton().tree_hash();
+  graph.functions_ = ConnectionSpace(space, options.connection).functions();
+  graph.take_in(library, space_id, progress);
+  return graph;
+}
+
+MotionGraph MotionGraph::of(LibraryView& library, std::int64_t space_id, const MotionGraphOptions& options,
+                            const Progress& progress, bool* changed) {
+  options.validate();
+  if (changed) *changed = true;
+  const std::string key = library.space(space_id).skeleton().tree_hash();
+  const auto kept = library.library().artifact(artifact_kind, key);
+  if (!kept) return make(library, space_id, options, progress);
+  MotionGraph graph = unpack(*kept, library.library().path().string());
+  graph.key_ = key;
+  const MotionGraphOptions& had = graph.options_;
+  const bool same = had.connections == options.connections && had.neighbours == options.neighbours &&
+                    had.largest_cost_cm == options.largest_cost_cm &&
+                    had.connection.window_s == options.connection.window_s &&
+                    had.connection.shortest_s == options.connection.shortest_s &&
+                    had.connection.functions == options.connection.functions;
+  std::set<std::int64_t> present;
+  for (const ClipRow& row : library.library().clips()) {
+    if (row.space_id == space_id) present.insert(row.id);
+  }
+  const bool gone = std::ranges::any_of(graph.clips_, [&](std::int64_t id) { return !present.contains(id); });
+  if (!same || gone) return make(library, space_id, options, progress);
+  const std::size_t clips = graph.clips_.size();
+  graph.take_in(library, space_id, progress);
+  if (changed) *changed = graph.clips_.size() != clips;
+  return graph;
+}
+
+void MotionGraph::save(Library& library) const {
+  library.put_artifact(artifact_kind, key_, pack());
+}
+
+void MotionGraph::take_in(LibraryView& library, std::int64_t space_id, const Progress& progress) {
+  const std::set<std::int64_t> had(clips_.begin(), clips_.end());
+  std::vector<ClipRow> rows;
+  bool any = false;
+  const ConnectionSpace space(library.space(space_id), functions_, options_.connection);
+  for (const ClipRow& row : library.library().clips()) {
+    if (row.space_id != space_id || !space.long_enough(static_cast<double>(row.frames - 1) / row.rate_hz)) continue;
+    any = any || !had.contains(row.id);
+    rows.push_back(row);
+  }
+  if (!any) return;
+
+  std::vector<GraphMotion> motions;
+  std::map<std::int64_t, std::size_t> index;
+  clips_.clear();
+  durations_s_.clear();
+  for (const ClipRow& row : rows) {
+    progress.check_stop();
+    progress.at("reading motions", static_cast<double>(motions.size()) / static_cast<double>(rows.size()));
+    const ClipCurves curves = library.curves(row);
+    index[row.id] = motions.size();
+    motions.push_back({row.id, !had.contains(row.id), space.start_of(curves), space.end_of(curves)});
+    clips_.push_back(row.id);
+    durations_s_.push_back(static_cast<double>(row.frames - 1) / row.rate_hz);
+  }
+
+  std::vector<const ConnectionMotion*> ends, starts;
+  for (const GraphMotion& motion : motions) {
+    ends.push_back(&motion.end);
+    starts.push_back(&motion.start);
+  }
+  const ConnectionBounds limits(options_.connection, ends, starts);
+  BestWays out(space, limits, motions, options_, true), in(space, limits, motions, options_, false);
+  for (const GraphArrow& arrow : arrows_) {
+    if (arrow.kind != GraphArrow::Kind::connection) continue;
+    out.know(index.at(arrow.from), {arrow.cost_cm, index.at(arrow.to)});
+    in.know(index.at(arrow.to), {arrow.cost_cm, index.at(arrow.from)});
+  }
+  over_all(motions.size(), "connecting motions", progress, [&](std::size_t i) { out.search(i); });
+  in.use(out);
+  over_all(motions.size(), "connecting motions (into)", progress, [&](std::size_t i) { in.search(i); });
+
+  std::map<std::pair<std::int64_t, std::int64_t>, double> connections;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    for (const Way& way : out.of(i)) connections[{motions[i].id, motions[way.other].id}] = way.cost_cm;
+    for (const Way& way : in.of(i)) connections[{motions[way.other].id, motions[i].id}] = way.cost_cm;
+  }
+
+  // Neighbours: which they are is cheap to find; how far apart they are is kept from before where it is known.
+  std::map<std::pair<std::int64_t, std::int64_t>, double> known;
+  for (const GraphArrow& arrow : arrows_) {
+    if (arrow.kind == GraphArrow::Kind::neighbour) known[{arrow.from, arrow.to}] = arrow.cost_cm;
+  }
+  const RetrievalMatrix matrix = library.library().retrieval_matrix(space_id);
+  const auto nearest = nearest_rows(matrix, options_.neighbours);
+  std::set<std::pair<std::int64_t, std::int64_t>> pairs;
+  for (std::size_t i = 0; i < nearest.size(); ++i) {
+    for (const std::size_t k : nearest[i]) {
+      const auto a = matrix.clip_ids[i], b = matrix.clip_ids[k];
+      if (index.contains(a) && index.contains(b)) pairs.insert(std::minmax(a, b));
+    }
+  }
+  arrows_.clear();
+  for (const auto& [way, cost] : connections) {
+    arrows_.push_back({way.first, way.second, GraphArrow::Kind::connection, cost});
+  }
+  std::size_t done = 0;
+  for (const auto& [a, b] : pairs) {
+    if (done % block == 0) {
+      progress.check_stop();
+      progress.at("comparing neighbours", static_cast<double>(done) / static_cast<double>(pairs.size()));
+    }
+    ++done;
+    const auto kept = known.find({a, b});
+    const ClipRow& row = rows[index.at(a)];
+    const double cost = kept != known.end()
+                            ? kept->second
+                            : motion_distance_cm(library.curves(row), library.curves(rows[index.at(b)]),
+                                                 library.skeleton(row.skeleton_id));
+    if (cost > options_.largest_cost_cm) continue;
+    arrows_.push_back({a, b, GraphArrow::Kind::neighbour, cost});
+    arrows_.push_back({b, a, GraphArrow::Kind::neighbour, cost});
+  }
+  std::vector<std::pair<std::size_t, std::size_t>> joined;
+  for (const GraphArrow& arrow : arrows_) joined.emplace_back(index.at(arrow.from), index.at(arrow.to));
+  progress.at("joining groups", 0);
+  for (const GraphBridge& bridge : graph_bridges(space, ends, starts, std::move(joined), options_.largest_cost_cm)) {
+    arrows_.push_back({clips_[bridge.from], clips_[bridge.to], GraphArrow::Kind::connection, bridge.cost_cm});
+  }
+  std::ranges::sort(arrows_, before);
+}
+
+std::optional<GraphPath> MotionGraph::path(std::int64_t from, std::int64_t to) const {
+  const auto place = [&](std::int64_t id) { return std::ranges::lower_bound(clips_, id) - clips_.begin(); };
+  const auto holds = [&](std::int64_t id) { return std::ranges::binary_search(clips_, id); };
+  if (!holds(from) || !holds(to)) return std::nullopt;
+  if (from == to) return GraphPath{.clips = {from}};
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  std::vector<double> cost(clips_.size(), infinite);
+  std::vector<const GraphArrow*> by(clips_.size(), nullptr);
+  using Entry = std::pair<double, std::int64_t>;
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  cost[static_cast<std::size_t>(place(from))] = 0;
+  open.emplace(0, from);
+  while (!open.empty()) {
+    const auto [so_far, clip] = open.top();
+    open.pop();
+    const auto here = static_cast<std::size_t>(place(clip));
+    if (so_far > cost[here]) continue;
+    if (clip == to) break;
+    const double playing = clip == from ? 0 : second_cost_cm * durations_s_[here];
+    for (auto arrow = std::ranges::lower_bound(arrows_, clip, {}, &GraphArrow::from);
+         arrow != arrows_.end() && arrow->from == clip; ++arrow) {
+      const double next = so_far + playing + arrow->cost_cm + arrow_cost_cm;
+      const auto there = static_cast<std::size_t>(place(arrow->to));
+      if (next >= cost[there]) continue;
+      cost[there] = next;
+      by[there] = &*arrow;
+      open.emplace(next, arrow->to);
+    }
+  }
+  if (cost[static_cast<std::size_t>(place(to))] == infinite) return std::nullopt;
+  GraphPath out{.clips = {to}};
+  while (out.clips.back() != from) {
+    const GraphArrow* arrow = by[static_cast<std::size_t>(place(out.clips.back()))];
+    out.kinds.push_back(arrow->kind);
+    out.cost_cm += arrow->cost_cm;
+    out.clips.push_back(arrow->from);
+  }
+  std::ranges::reverse(out.clips);
+  std::ranges::reverse(out.kinds);
+  return out;
+}
+
+}  // namespace kinespace
