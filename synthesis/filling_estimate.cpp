@@ -1,0 +1,108 @@
+#include "synthesis/filling_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+
+namespace kinespace {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Gauss kernel of the distances, its width the distance of the window a quarter down the list; sum 1.
+VectorXd kernel_weights(std::span<const double> distances) {
+  const double width = distances[distances.size() / 4] + 1e-12;
+  VectorXd out(static_cast<Index>(distances.size()));
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    out(static_cast<Index>(i)) = std::exp(-0.5 * (distances[i] - distances[0]) / width);
+  }
+  return out / out.sum();
+}
+
+double matern(double apart_s, const WindowPrior& prior) {
+  const double x = std::numbers::sqrt3 * std::abs(apart_s) / prior.length_s;
+  return (1 + x) * std::exp(-x);
+}
+
+// The process in time: how the unseen rows follow from the seen ones.
+struct Bridge {
+  MatrixXd seen_factor;  // L, L L' = V
+  MatrixXd gain;         // cov(u, o) V^-1
+  VectorXd open;         // variance left in each unseen row
+};
+
+Bridge bridge_of(const std::vector<int>& seen, const std::vector<int>& unseen, const WindowPrior& prior) {
+  const double variance = prior.scale_m * prior.scale_m;
+  const auto covariance = [&](const std::vector<int>& a, const std::vector<int>& b) {
+    MatrixXd out(static_cast<Index>(a.size()), static_cast<Index>(b.size()));
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      for (std::size_t j = 0; j < b.size(); ++j) {
+        out(static_cast<Index>(i), static_cast<Index>(j)) = variance * matern((a[i] - b[j]) / filling_rate_hz, prior);
+      }
+    }
+    return out;
+  };
+  MatrixXd v = covariance(seen, seen);
+  v.diagonal().array() += variance * prior.noise * prior.noise;
+  const Eigen::LLT<MatrixXd> factor(v);
+  const MatrixXd across = covariance(unseen, seen);
+  Bridge out;
+  out.seen_factor = factor.matrixL();
+  out.gain = factor.solve(across.transpose()).transpose();
+  out.open = (variance - (out.gain.array() * across.array()).rowwise().sum()).max(0.0);
+  return out;
+}
+
+}  // namespace
+
+WindowEstimate estimate_window(const FeatureMatrix& members, std::span<const double> distances,
+                               const SampleMatrix& seen, const WindowShape& shape, const WindowPrior& prior,
+                               bool with_modes) {
+  std::vector<int> o;
+  std::vector<int> u;
+  for (int r = 0; r < shape.frames(); ++r) (shape.seen(r) ? o : u).push_back(r);
+  const Bridge bridge = bridge_of(o, u, prior);
+  const auto lower = bridge.seen_factor.triangularView<Eigen::Lower>();
+
+  const Index curves = seen.cols();
+  const auto count = std::min<Index>(prior.windows, members.rows());
+  const VectorXd weight = kernel_weights(distances.first(static_cast<std::size_t>(count)));
+  const Eigen::RowVectorXd mean_row = weight.transpose() * members.topRows(count).cast<double>();
+  const Eigen::Map<const SampleMatrix> mean(mean_row.data(), shape.frames(), curves);
+
+  // What each window differs from the mean: whitened where seen, and in the gap less what the bridge would put there.
+  const auto n_o = static_cast<Index>(o.size());
+  const auto n_u = static_cast<Index>(u.size());
+  SampleMatrix whitened(count, n_o * curves);
+  SampleMatrix beyond(count, n_u * curves);
+  SampleMatrix difference(shape.frames(), curves);
+  for (Index k = 0; k < count; ++k) {
+    const Eigen::RowVectorXd row = (members.row(k).cast<double>() - mean_row) * std::sqrt(weight(k));
+    difference = Eigen::Map<const SampleMatrix>(row.data(), shape.frames(), curves);
+    SampleMatrix part = difference(o, Eigen::all);
+    Eigen::Map<SampleMatrix>(beyond.row(k).data(), n_u, curves) = difference(u, Eigen::all) - bridge.gain * part;
+    lower.solveInPlace(part);
+    Eigen::Map<SampleMatrix>(whitened.row(k).data(), n_o, curves) = part;
+  }
+  SampleMatrix misfit = seen(o, Eigen::all) - mean(o, Eigen::all);
+  SampleMatrix estimate = mean(u, Eigen::all) + bridge.gain * misfit;
+  lower.solveInPlace(misfit);
+
+  MatrixXd precision = MatrixXd::Identity(count, count);
+  precision.selfadjointView<Eigen::Lower>().rankUpdate(whitened);
+  const Eigen::LLT<MatrixXd> factor(precision.selfadjointView<Eigen::Lower>());
+  const VectorXd scores = factor.solve(whitened * Eigen::Map<const VectorXd>(misfit.data(), misfit.size()));
+  Eigen::Map<Eigen::RowVectorXd>(estimate.data(), estimate.size()) += scores.transpose() * beyond;
+
+  WindowEstimate out{.mean = std::move(estimate), .modes = {}, .open_variance = bridge.open};
+  if (!with_modes) return out;
+  factor.matrixL().solveInPlace(beyond);  // L^-1 E: its rows are the modes, since cov z = L^-T L^-1
+  for (Index k = 0; k < count; ++k) out.modes.emplace_back(Eigen::Map<SampleMatrix>(beyond.row(k).data(), n_u, curves));
+  return out;
+}
+
+}  // namespace kinespace
