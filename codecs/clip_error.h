@@ -1,5 +1,5 @@
-// How far decoded clips are from the originals, summed up over many clips: what a codec writes into its stream's header.
-// The measures are those of motion/error_measures.h, weighted by frames times joints.
+// How far decoded clips are from the originals, summed up over many clips: what a codec writes into its stream's
+// header. The measures are those of motion/error_measures.h, weighted by frames times joints.
 #pragma once
 
 #include <cstdint>
@@ -22,8 +22,8 @@ struct ClipErrorSums {
   [[nodiscard]] MeasuredError measured() const;
 };
 
-// Frames [first, first + count) of clips of the same joints in the same order; frame `first` of `original` against frame
-// `decoded_first` of `decoded`.
+// Frames [first, first + count) of clips of the same joints in the same order; frame `first` of `original` against
+// frame `decoded_first` of `decoded`.
 [[nodiscard]] ClipErrorSums clip_error(const Clip& original, const Clip& decoded, int first, int count,
                                        int decoded_first);
 

@@ -16,7 +16,20 @@ constexpr std::int64_t longest_name = 1 << 16;
 constexpr std::int64_t most_side_bytes = std::int64_t{1} << 30;
 
 // Contexts of integer_model.h, by what the number is.
-enum Kind : int { count, length, parent, channel, skeleton_number, rate_number, frame_count, place, heading, block, side, fineness };
+enum Kind : int {
+  count,
+  length,
+  parent,
+  channel,
+  skeleton_number,
+  rate_number,
+  frame_count,
+  place,
+  heading,
+  block,
+  side,
+  fineness
+};
 
 // Text that resembles the text before it: as long as the two agree, the byte there predicts; then the byte before.
 class TextContext {

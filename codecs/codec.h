@@ -1,9 +1,9 @@
 // What every codec of clips does: clips to a stream, a stream to clips.
 //
-// A stream is a Bitstream (storage/bitstream.h) whose kind is "codec:" and the codec's name; it says in its header how far
-// its clips are from what was encoded (measured on the decoded clips, never estimated). A codec is driven by its own
-// settings or by a target that it then meets. A decoded clip is a full clip: name, rate, skeleton, root, rotations, and
-// the translations of joints that move.
+// A stream is a Bitstream (storage/bitstream.h) whose kind is "codec:" and the codec's name; it says in its header how
+// far its clips are from what was encoded (measured on the decoded clips, never estimated). A codec is driven by its
+// own settings or by a target that it then meets. A decoded clip is a full clip: name, rate, skeleton, root, rotations,
+// and the translations of joints that move.
 //
 //   const Bytes stream = encode("motion-space", clips, {.target = {.mean_error_cm = 0.5}});       codecs/registry.h
 //   const auto reader = open_stream(stream, "dance.ksm");
@@ -28,9 +28,9 @@ namespace kinespace {
 
 // What the stream must keep to. At most one; none: the codec's settings decide.
 struct CodecTarget {
-  std::optional<double> mean_error_cm;   // of joint positions over all joints and frames of all clips, > 0
-  std::optional<double> max_error_cm;    // no joint in any frame farther off than this, > 0
-  std::optional<std::int64_t> bytes;     // of the whole stream, > 0
+  std::optional<double> mean_error_cm;  // of joint positions over all joints and frames of all clips, > 0
+  std::optional<double> max_error_cm;   // no joint in any frame farther off than this, > 0
+  std::optional<std::int64_t> bytes;    // of the whole stream, > 0
 
   [[nodiscard]] bool any() const { return mean_error_cm || max_error_cm || bytes; }
   // Throws Error{usage} naming field, value and legal range.
@@ -75,8 +75,8 @@ class StreamReader {
   // has fewer. Codecs that know no levels have one.
   [[nodiscard]] virtual int levels() const { return 1; }
 
-  // Frames [first, first + count) of a clip, with the first `level` levels (all when < 0). Throws Error{usage} for what is
-  // not there, Error{bad_input} when the stream is damaged.
+  // Frames [first, first + count) of a clip, with the first `level` levels (all when < 0). Throws Error{usage} for what
+  // is not there, Error{bad_input} when the stream is damaged.
   [[nodiscard]] virtual Clip decode(std::size_t clip, int first, int count, int level) const = 0;
   // All clips, several at a time.
   [[nodiscard]] virtual std::vector<Clip> decode_all(int level) const = 0;
@@ -98,8 +98,8 @@ class Codec {
 
   [[nodiscard]] virtual std::string_view name() const = 0;
   [[nodiscard]] virtual std::span<const CodecSetting> settings() const = 0;
-  // Options have been checked. Throws Error{usage} when the target cannot be met, Error{bad_input} for clips that cannot
-  // be encoded (no frames, values that are no numbers).
+  // Options have been checked. Throws Error{usage} when the target cannot be met, Error{bad_input} for clips that
+  // cannot be encoded (no frames, values that are no numbers).
   [[nodiscard]] virtual Bytes encode(std::span<const Clip> clips, const CodecOptions& options) const = 0;
   // The stream's bytes must outlive the reader.
   [[nodiscard]] virtual std::unique_ptr<StreamReader> open(Bitstream stream) const = 0;

@@ -11,7 +11,8 @@ namespace kinespace {
 namespace {
 
 // Of the neighbours' weighted sum of magnitudes, for sums up to 255; larger ones take the last.
-constexpr std::array<int, CoefficientModels::neighbourhoods - 1> sum_edges{1, 2, 3, 4, 6, 9, 13, 19, 28, 41, 62, 95, 150};
+constexpr std::array<int, CoefficientModels::neighbourhoods - 1> sum_edges{1,  2,  3,  4,  6,  9,  13,
+                                                                           19, 28, 41, 62, 95, 150};
 
 constexpr std::array<std::uint8_t, 256> make_sum_levels() {
   std::array<std::uint8_t, 256> out{};
@@ -83,8 +84,8 @@ struct Context {
 
 // Visits every coefficient of a layer that is coded: code(block index, component, k, context) gives its magnitude.
 template <typename Code>
-void visit_layer(std::span<const CoefficientBlock> blocks, std::vector<Magnitudes>& magnitudes, const Spectrum& spectrum,
-                 int layer, const Code& code) {
+void visit_layer(std::span<const CoefficientBlock> blocks, std::vector<Magnitudes>& magnitudes,
+                 const Spectrum& spectrum, int layer, const Code& code) {
   const auto first = layer_bands[static_cast<std::size_t>(layer)];
   const auto last = layer_bands[static_cast<std::size_t>(layer) + 1];
   for (std::size_t b = 0; b < blocks.size(); ++b) {
@@ -162,7 +163,8 @@ class Writer {
     if (magnitude == 1) return bits;
     const auto rest = static_cast<std::uint64_t>(magnitude - 1);
     const int exponent = bit_length(rest) - 1;
-    for (int e = 0; e <= exponent; ++e) bits += cost_of(models_.exponent[at.near][static_cast<std::size_t>(e)], e < exponent);
+    for (int e = 0; e <= exponent; ++e)
+      bits += cost_of(models_.exponent[at.near][static_cast<std::size_t>(e)], e < exponent);
     return bits + static_cast<float>(exponent);
   }
 
@@ -331,7 +333,8 @@ LearnedStart ModelCounts::learn() const {
   for (const auto& [zeros, ones] : seen) {
     const double odds = (ones + 0.4) / (zeros + 0.4);
     const double step = std::round(32 + 4 * std::log(odds));
-    out.steps.push_back(zeros + ones < enough ? std::uint8_t{0} : static_cast<std::uint8_t>(std::clamp(step, 1.0, 63.0)));
+    out.steps.push_back(zeros + ones < enough ? std::uint8_t{0}
+                                              : static_cast<std::uint8_t>(std::clamp(step, 1.0, 63.0)));
   }
   return out;
 }

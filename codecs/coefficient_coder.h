@@ -77,11 +77,11 @@ struct ModelCounts {
 
 // One block as the coder sees it.
 struct CoefficientBlock {
-  int functions = 0;                           // coded at all, the stride of `values`
-  std::array<int, band_count + 1> edges{};     // of the bands, at most `functions`
-  bool follows = false;                        // goes on from the block before it in the group
-  std::span<const double> wanted;              // encoder: [component][function], in quantiser steps
-  std::span<double> values;                    // out: what the decoder will have, in quantiser steps
+  int functions = 0;                        // coded at all, the stride of `values`
+  std::array<int, band_count + 1> edges{};  // of the bands, at most `functions`
+  bool follows = false;                     // goes on from the block before it in the group
+  std::span<const double> wanted;           // encoder: [component][function], in quantiser steps
+  std::span<double> values;                 // out: what the decoder will have, in quantiser steps
 };
 
 // What |q| = 1, 2, more are decoded to beside themselves, by spectrum level, in 1/64 steps: coefficients lie nearer to
@@ -94,10 +94,10 @@ struct ReconstructionPoints {
 // What the encoder learns while coding.
 struct CodingStatistics {
   ModelCounts counts;
-  std::vector<double> magnitude;                                            // [component][band]: sums of |q|
-  std::vector<double> coefficients;                                         // their number
+  std::vector<double> magnitude;                                                  // [component][band]: sums of |q|
+  std::vector<double> coefficients;                                               // their number
   std::array<std::array<std::array<double, 2>, 3>, Spectrum::levels> residual{};  // sum of |wanted| - |q|, count
-  double squared_error = 0;                                                 // in squared steps
+  double squared_error = 0;                                                       // in squared steps
 
   void add(const CodingStatistics& other);
   [[nodiscard]] ReconstructionPoints reconstruction() const;

@@ -50,7 +50,8 @@ class IntegerWriter {
   RangeEncoder coder_;
 };
 
-// Reads what IntegerWriter wrote. Throws Error{bad_input} naming `source` when the bytes run out or a number is too big.
+// Reads what IntegerWriter wrote. Throws Error{bad_input} naming `source` when the bytes run out or a number is too
+// big.
 class IntegerReader {
  public:
   IntegerReader(std::span<const std::byte> bytes, std::string source) : coder_(bytes), source_(std::move(source)) {}

@@ -32,8 +32,9 @@ Eigen::MatrixXd JointBasis::mixing() const {
   for (int c = 0; c < components; ++c) {
     const double step = std::ldexp(1.0, -exponents[static_cast<std::size_t>(c)]);
     for (int r = 0; r < dimensions; ++r) {
-      out(r, c) = step * entries[static_cast<std::size_t>(c) * static_cast<std::size_t>(dimensions) +
-                                 static_cast<std::size_t>(r)];
+      out(r, c) =
+          step *
+          entries[static_cast<std::size_t>(c) * static_cast<std::size_t>(dimensions) + static_cast<std::size_t>(r)];
     }
   }
   return out;

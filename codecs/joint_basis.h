@@ -3,10 +3,10 @@
 //   B = L0^-T V
 //
 // L0 L0' is the position metric at the reference pose (position_metric.h), which the decoder computes for itself, and V
-// is sent, in whole multiples of a power of two for each column, finer for columns that carry much. V is what makes B the
-// Karhunen-Loeve basis of the clips' poses in the metric averaged over the clips: then white noise in z is white noise in
-// joint positions, and the energy stands in the first components. V need not be exact: the encoder projects on the B that
-// the decoder has.
+// is sent, in whole multiples of a power of two for each column, finer for columns that carry much. V is what makes B
+// the Karhunen-Loeve basis of the clips' poses in the metric averaged over the clips: then white noise in z is white
+// noise in joint positions, and the energy stands in the first components. V need not be exact: the encoder projects on
+// the B that the decoder has.
 #pragma once
 
 #include <cstdint>
@@ -38,8 +38,8 @@ struct JointBasis {
 
 // What encoders plan with: the exact basis of second moments C of pose vectors in the metric M.
 struct KarhunenLoeve {
-  Eigen::MatrixXd basis;      // B, dimensions x dimensions: B' M B = I, columns by falling energy
-  Eigen::VectorXd energy;     // mean square of each component
+  Eigen::MatrixXd basis;   // B, dimensions x dimensions: B' M B = I, columns by falling energy
+  Eigen::VectorXd energy;  // mean square of each component
 };
 [[nodiscard]] KarhunenLoeve karhunen_loeve(const Eigen::MatrixXd& metric, const Eigen::MatrixXd& second_moments);
 

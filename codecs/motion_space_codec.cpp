@@ -18,7 +18,7 @@ namespace {
 constexpr std::array codec_settings{
     CodecSetting{"step", 2.5, 1e-6, 1e6, "quantiser step where no target is given, in cm times the root of the joints"},
     CodecSetting{"shell_ratio", 1.6, 1.05, 100, "largest shell error, as a multiple of the mean joint error"},
-    CodecSetting{"rate_weight", 0.14, 0, 1, "squared steps that a bit is worth when values are chosen"},
+    CodecSetting{"rate_weight", 0.18, 0, 1, "squared steps that a bit is worth when values are chosen"},
     CodecSetting{"window_s", 0, 0, 60, "length of the windows in seconds; 0: cut where it saves bits"},
     CodecSetting{"group_frames", 4096, 1, 1 << 20, "frames that are decoded together at least"},
 };
@@ -33,7 +33,7 @@ class Search {
   Search(std::span<const Clip> clips, const CodecOptions& options, MotionSpaceSettings settings, double shell_ratio)
       : encoder_(clips, options.progress), options_(options), settings_(settings), shell_ratio_(shell_ratio) {
     const std::int64_t groups = encoder_.frames() / settings_.group_frames;
-    sample_ = static_cast<int>(std::clamp<std::int64_t>(groups / 6, 1, 64));
+    sample_ = static_cast<int>(std::clamp<std::int64_t>(groups / 4, 2, 64));
   }
 
   Bytes at_step(double step) {
@@ -43,9 +43,9 @@ class Search {
 
   Bytes for_mean_error(double target) {
     double step = step_for(target);
+    encoder_.plan(step, settings_);
     step = approach(step, target);
-    settle(step);
-    step = approach(step, target);
+    step = balance(step, target);
     // The sample is not the whole: correct on the whole until the bound holds.
     constexpr int most_rounds = 12;
     double goal = target;
@@ -56,7 +56,8 @@ class Search {
       const bool close = error >= 0.98 * target || error == 0;
       const bool shell = attempt.error.shell_cm() <= shell_ratio_ * std::max(error, 1e-9) || error == 0;
       if (!shell && round + 1 < most_rounds) {
-        raise_shell_weight(step);
+        settings_.shell_weight *= 1.3;
+        encoder_.weigh_again(settings_);
         continue;
       }
       if (met && (close || round > 4)) {
@@ -90,7 +91,7 @@ class Search {
     double step = 2.5;
     settle(step);
     Bytes best;
-    double fits = 0;     // the finest step known to fit
+    double fits = 0;      // the finest step known to fit
     double too_fine = 0;  // the coarsest known not to
     constexpr int most_rounds = 16;
     for (int round = 0; round < most_rounds; ++round) {
@@ -115,44 +116,51 @@ class Search {
   }
 
  private:
-  // Plans for this step, and finds the shell weight that holds the ratio.
+  // Plans for this step and finds the shell weight that just holds the ratio, on the sample.
   void settle(double step) {
     encoder_.plan(step, settings_);
-    planned_ = true;
-    MotionSpaceSettings sampled = settings_;
-    sampled.sample = std::max(2, sample_);
-    constexpr int most_rounds = 6;
-    for (int round = 0; round < most_rounds; ++round) {
-      last_ = encoder_.attempt(step, sampled, last_ ? &*last_ : nullptr);
-      const double error = last_->error.mean_cm();
-      if (error == 0 || last_->error.shell_cm() <= 0.985 * shell_ratio_ * error) return;
-      settings_.shell_weight *= 1.6;
-      sampled.shell_weight = settings_.shell_weight;
-      encoder_.plan(step, settings_);
-    }
+    sample_at(step);
+    balance(step, {});
   }
 
-  void raise_shell_weight(double step) {
-    settings_.shell_weight *= 1.4;
-    settle(step);
+  void sample_at(double step) {
+    MotionSpaceSettings sampled = settings_;
+    sampled.sample = sample_;
+    last_ = encoder_.attempt(step, sampled, last_ ? &*last_ : nullptr);
   }
 
   // Steps on the sample until its error is near the target.
   double approach(double step, double target) {
-    if (!planned_) {
-      encoder_.plan(step, settings_);
-      planned_ = true;
-    }
-    MotionSpaceSettings sampled = settings_;
-    sampled.sample = std::max(2, sample_);
     constexpr int most_rounds = 6;
     for (int round = 0; round < most_rounds; ++round) {
-      last_ = encoder_.attempt(step, sampled, last_ ? &*last_ : nullptr);
+      sample_at(step);
       const double error = last_->error.mean_cm();
       if (!(error > 0)) return step;
       const double factor = target / error;
       step *= std::clamp(std::pow(factor, 1.15), 0.1, 4.0);
-      if (factor > 0.98 && factor < 1.02) break;
+      if (factor > 0.985 && factor < 1.015) break;
+    }
+    return step;
+  }
+
+  // Moves the shell weight until the ratio of the errors is just held. With a target, the step follows.
+  double balance(double step, std::optional<double> target) {
+    constexpr int most_rounds = 5;
+    constexpr double lightest = 0.004;
+    for (int round = 0; round < most_rounds; ++round) {
+      const double error = last_->error.mean_cm();
+      if (!(error > 0)) break;
+      const double ratio = last_->error.shell_cm() / error / shell_ratio_;
+      const bool light = settings_.shell_weight <= lightest && ratio < 1;
+      if (light || (ratio > 0.96 && ratio < 0.99)) break;
+      // The ratio falls with about the tenth root of the weight.
+      const double factor = std::pow(ratio / 0.975, 8);
+      settings_.shell_weight = std::max(lightest, settings_.shell_weight * std::clamp(factor, 0.15, 4.0));
+      encoder_.weigh_again(settings_);
+      sample_at(step);
+      if (target && last_->error.mean_cm() > 0) {
+        step *= std::clamp(std::pow(*target / last_->error.mean_cm(), 1.15), 0.25, 4.0);
+      }
     }
     return step;
   }
@@ -197,7 +205,6 @@ class Search {
   MotionSpaceSettings settings_;
   double shell_ratio_;
   int sample_ = 1;
-  bool planned_ = false;
   std::optional<Attempt> last_;
 };
 

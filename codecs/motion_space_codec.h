@@ -8,13 +8,14 @@
 //           chosen by squared error + lambda * bits
 //        -> the context-modelled range coder (coefficient_coder.h)
 //
-// All clips of a stream share skeletons, basis, spectrum and the start of the models. Functions are ordered from slow to
-// fast in five layers over all clips: a prefix of the stream is the same motion with less detail (StreamReader::levels).
-// Windows are coded in groups of about 4096 frames, so that one clip or a part of it is decoded without the rest.
+// All clips of a stream share skeletons, basis, spectrum and the start of the models. Functions are ordered from slow
+// to fast in five layers over all clips: a prefix of the stream is the same motion with less detail
+// (StreamReader::levels). Windows are coded in groups of about 4096 frames, so that one clip or a part of it is decoded
+// without the rest.
 //
-// Targets: mean_error_cm is met within 2 % from below; max_error_cm by making the step finer in the windows that need it;
-// bytes by the step. The shell error (hands, toes, turns of limbs about themselves) is held to settings.shell_ratio times
-// the mean joint error by its weight in the metric.
+// Targets: mean_error_cm is met within 2 % from below; max_error_cm by making the step finer in the windows that need
+// it; bytes by the step. The shell error (hands, toes, turns of limbs about themselves) is held to settings.shell_ratio
+// times the mean joint error by its weight in the metric.
 //
 // What it does not do: keep a skeleton's offsets to more than 32-bit floats, rotations to more than 1e-6 rad or so (the
 // finest step), or jump-free seams between windows: the two sides of a seam are off as much as frames elsewhere are.

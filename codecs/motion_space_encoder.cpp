@@ -18,8 +18,12 @@ namespace {
 
 constexpr std::size_t metric_samples = 256;
 constexpr int planned_components = 16;  // that windows are planned by: nearly all of the energy
-static const int coarsest_exponent = getenv("CE") ? atoi(getenv("CE")) : 5; static const int extra_exponent = getenv("EE") ? atoi(getenv("EE")) : 2;
-constexpr double unlikely = 0.62;       // steps; what is smaller will be coded as zero
+// The basis is sent in steps of 2^-exponent: fine enough that a component of that energy leaks less than a step into
+// the others, and never so coarse that columns of unit length lose their shape.
+constexpr int coarsest_exponent = 5;
+constexpr int extra_exponent = 4;
+constexpr std::size_t windows_at_once = 16;
+constexpr double unlikely = 0.62;  // steps; what is smaller will be coded as zero
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 using Curves = Eigen::Map<const RowMatrix>;
@@ -119,9 +123,22 @@ void MotionSpaceEncoder::add_metrics() {
 }
 
 void MotionSpaceEncoder::plan(double step, const MotionSpaceSettings& settings) {
-  metric_ = metrics_.combined(settings.shell_weight);
-  exact_ = karhunen_loeve(metric_, moments_);
+  weigh(settings.shell_weight);
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { cut(c, step, settings); });
+  transform();
+}
+
+void MotionSpaceEncoder::weigh_again(const MotionSpaceSettings& settings) {
+  weigh(settings.shell_weight);
+  transform();
+}
+
+void MotionSpaceEncoder::weigh(double shell_weight) {
+  metric_ = metrics_.combined(shell_weight);
+  exact_ = karhunen_loeve(metric_, moments_);
+}
+
+void MotionSpaceEncoder::transform() {
   progress_.check_stop();
   first_window_.assign(1, 0);
   for (const ClipEntry& clip : table_.clips) first_window_.push_back(first_window_.back() + clip.blocks.size());
@@ -135,9 +152,8 @@ void MotionSpaceEncoder::plan(double step, const MotionSpaceSettings& settings) 
   std::ranges::sort(lengths);
   lengths.erase(std::unique(lengths.begin(), lengths.end()), lengths.end());
   std::vector<std::shared_ptr<const WindowTransform>> made(lengths.size());
-  tbb::parallel_for(std::size_t{0}, lengths.size(), [&](std::size_t i) {
-    made[i] = std::make_shared<const WindowTransform>(lengths[i], lengths[i]);
-  });
+  tbb::parallel_for(std::size_t{0}, lengths.size(),
+                    [&](std::size_t i) { made[i] = std::make_shared<const WindowTransform>(lengths[i], lengths[i]); });
   for (std::size_t i = 0; i < lengths.size(); ++i) transforms[lengths[i]] = made[i];
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
     const RowMatrix z = analysis * curves_of(vectors_[c], d);
@@ -178,12 +194,15 @@ void MotionSpaceEncoder::cut(std::size_t c, double step, const MotionSpaceSettin
 }
 
 // What coding a component takes off the squared error, in squared steps, less what its bits are worth.
-double MotionSpaceEncoder::gain_of(int component, double step) const {
+double MotionSpaceEncoder::gain_of(int component, double step, std::span<const std::size_t> windows) const {
   constexpr double bits_of_value = 7;
   constexpr double bits_of_entry = 3;
   constexpr double worth = 0.12;
-  double gain = -worth * bits_of_entry * reference_.dimensions();
-  for (const std::vector<double>& window : coefficients_) {
+  // A sample of the windows is to pay for its share of the basis.
+  double gain = -worth * bits_of_entry * reference_.dimensions() * static_cast<double>(windows.size()) /
+                static_cast<double>(window_count());
+  for (const std::size_t w : windows) {
+    const std::vector<double>& window = coefficients_[w];
     const std::size_t points = window.size() / static_cast<std::size_t>(reference_.dimensions());
     for (std::size_t k = 0; k < points; ++k) {
       const double size = std::abs(window[static_cast<std::size_t>(component) * points + k]) / step;
@@ -193,11 +212,12 @@ double MotionSpaceEncoder::gain_of(int component, double step) const {
   return gain;
 }
 
-void MotionSpaceEncoder::choose_basis(double step, double shell_weight, MotionSpaceTables& tables,
+void MotionSpaceEncoder::choose_basis(std::span<const std::size_t> windows, MotionSpaceTables& tables,
                                       Eigen::MatrixXd& mixing) const {
+  const double step = tables.step;
   const int d = reference_.dimensions();
   std::vector<double> gains(static_cast<std::size_t>(d));
-  tbb::parallel_for(0, d, [&](int c) { gains[static_cast<std::size_t>(c)] = gain_of(c, step); });
+  tbb::parallel_for(0, d, [&](int c) { gains[static_cast<std::size_t>(c)] = gain_of(c, step, windows); });
   std::vector<int> kept;
   for (int c = 0; c < d; ++c) {
     if (gains[static_cast<std::size_t>(c)] > 0) kept.push_back(c);
@@ -207,20 +227,45 @@ void MotionSpaceEncoder::choose_basis(double step, double shell_weight, MotionSp
   for (std::size_t i = 0; i < kept.size(); ++i) {
     basis.col(static_cast<Eigen::Index>(i)) = exact_.basis.col(kept[i]);
     const double rms = std::sqrt(exact_.energy(kept[i]));
-    exponents.push_back(std::max(coarsest_exponent, static_cast<int>(std::ceil(std::log2(std::max(rms / step, 1e-3)))) + extra_exponent));
+    exponents.push_back(std::max(coarsest_exponent,
+                                 static_cast<int>(std::ceil(std::log2(std::max(rms / step, 1e-3)))) + extra_exponent));
   }
   const std::vector<double> rest(static_cast<std::size_t>(d), 0.0);
   const Eigen::MatrixXd lower =
-      fixed_cholesky(pose_metric(table_.skeletons.front(), reference_, rest).lifted(shell_weight));
+      fixed_cholesky(pose_metric(table_.skeletons.front(), reference_, rest).lifted(tables.shell_weight));
   tables.basis = quantise_basis(lower.transpose() * basis, exponents);
   const Eigen::MatrixXd sent = solve_transposed(lower, tables.basis.mixing());
   mixing = projection_onto(sent, metric_) * exact_.basis;
 }
 
+namespace {
+
+// Counts what plain rounding would give, which is where the spectrum starts from.
+void add_plain(std::span<const double> wanted, const WindowPlace& window, double rate_hz, int components,
+               CodingStatistics& sums) {
+  sums.magnitude.resize(static_cast<std::size_t>(components) * band_count);
+  sums.coefficients.resize(sums.magnitude.size());
+  const auto edges = band_edges(window.points, window.points, rate_hz);
+  for (int c = 0; c < components; ++c) {
+    const auto row = wanted.subspan(static_cast<std::size_t>(c) * static_cast<std::size_t>(window.points),
+                                    static_cast<std::size_t>(window.points));
+    for (std::size_t band = 0; band < band_count; ++band) {
+      const std::size_t cell = static_cast<std::size_t>(c) * band_count + band;
+      for (int k = edges[band]; k < edges[band + 1]; ++k) {
+        const double size = std::abs(row[static_cast<std::size_t>(k)]);
+        if (size > unlikely) sums.magnitude[cell] += std::floor(size + 0.5);
+      }
+      sums.coefficients[cell] += edges[band + 1] - edges[band];
+    }
+  }
+}
+
+}  // namespace
+
 // The state of one attempt.
 struct MotionSpaceEncoder::Coding {
   Attempt attempt;
-  std::vector<std::vector<double>> wanted;  // by window, [component][function], in steps
+  std::vector<std::vector<double>> wanted;   // by window, [component][function], in steps
   std::vector<CodingStatistics> statistics;  // by group
   std::vector<ClipErrorSums> errors;
 
@@ -291,6 +336,14 @@ void MotionSpaceEncoder::code_groups(Coding& coding, const MotionSpaceSettings& 
   for (const ClipErrorSums& error : coding.errors) a.error.add(error);
 }
 
+void MotionSpaceEncoder::scale(std::size_t w, const WindowPlace& window, const Eigen::MatrixXd& mixing,
+                               std::vector<double>& wanted) const {
+  wanted.resize(static_cast<std::size_t>(mixing.rows()) * static_cast<std::size_t>(window.points));
+  Eigen::Map<RowMatrix>(wanted.data(), mixing.rows(), window.points).noalias() =
+      (finer_factor(window.finer) * mixing) *
+      Eigen::Map<const RowMatrix>(coefficients_[w].data(), reference_.dimensions(), window.points);
+}
+
 Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& settings, const Attempt* learned,
                                     std::span<const int> finer) const {
   Coding coding;
@@ -301,40 +354,29 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
   a.tables.group_frames = settings.group_frames;
   a.tables.reference = reference_;
   Eigen::MatrixXd mixing;
-  choose_basis(step, settings.shell_weight, a.tables, mixing);
+  a.layout = lay_out(a.clips, {}, settings.group_frames);
+  std::vector<std::size_t> windows;  // that are coded
+  for (std::size_t g = 0; g < a.layout.groups.size(); g += static_cast<std::size_t>(settings.sample)) {
+    for (std::size_t i = 0; i < a.layout.groups[g].count; ++i) windows.push_back(a.layout.groups[g].first + i);
+  }
+  choose_basis(windows, a.tables, mixing);
   const int components = a.tables.basis.components;
   for (std::size_t c = 0; c < clips_.size() && !finer.empty(); ++c) {
-    for (std::size_t b = 0; b < a.clips.clips[c].blocks.size(); ++b) a.clips.clips[c].finer[b] = finer[first_window_[c] + b];
+    for (std::size_t b = 0; b < a.clips.clips[c].blocks.size(); ++b)
+      a.clips.clips[c].finer[b] = finer[first_window_[c] + b];
   }
 
   // Scaled coefficients, and what the spectrum of their plain rounding is.
   coding.wanted.resize(coefficients_.size());
-  std::vector<CodingStatistics> plain(clips_.size());
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
-    CodingStatistics& s = plain[c];
-    s.magnitude.assign(static_cast<std::size_t>(components) * band_count, 0.0);
-    s.coefficients = s.magnitude;
-    const ClipEntry& clip = a.clips.clips[c];
-    for (std::size_t b = 0; b < clip.blocks.size(); ++b) {
-      const int points = clip.blocks[b];
-      const auto& exact = coefficients_[first_window_[c] + b];
-      auto& wanted = coding.wanted[first_window_[c] + b];
-      wanted.resize(static_cast<std::size_t>(components) * static_cast<std::size_t>(points));
-      Eigen::Map<RowMatrix>(wanted.data(), components, points) =
-          (finer_factor(clip.finer[b]) / step) * mixing *
-          Eigen::Map<const RowMatrix>(exact.data(), reference_.dimensions(), points);
-      const auto edges = band_edges(points, points, clip.rate_hz);
-      for (int i = 0; i < components; ++i) {
-        for (std::size_t band = 0; band < band_count; ++band) {
-          const std::size_t cell = static_cast<std::size_t>(i) * band_count + band;
-          for (int k = edges[band]; k < edges[band + 1]; ++k) {
-            const double size =
-                std::abs(wanted[static_cast<std::size_t>(i) * static_cast<std::size_t>(points) + static_cast<std::size_t>(k)]);
-            if (size > unlikely) s.magnitude[cell] += std::floor(size + 0.5);
-          }
-          s.coefficients[cell] += edges[band + 1] - edges[band];
-        }
-      }
+  std::vector<CodingStatistics> plain((windows.size() + windows_at_once - 1) / windows_at_once);
+  tbb::parallel_for(std::size_t{0}, plain.size(), [&](std::size_t part) {
+    const std::size_t end = std::min(windows.size(), (part + 1) * windows_at_once);
+    for (std::size_t i = part * windows_at_once; i < end; ++i) {
+      const std::size_t w = windows[i];
+      const WindowPlace& window = a.layout.windows[w];
+      scale(w, window, mixing / step, coding.wanted[w]);
+      add_plain(coding.wanted[w], window, a.clips.clips[static_cast<std::size_t>(window.clip)].rate_hz, components,
+                plain[part]);
     }
   });
   CodingStatistics first;
@@ -362,9 +404,8 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
 
 ClipErrorSums MotionSpaceEncoder::error_of(std::span<const Clip> decoded) const {
   std::vector<ClipErrorSums> parts(clips_.size());
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
-    parts[c] = clip_error(clips_[c], decoded[c], 0, clips_[c].frames, 0);
-  });
+  tbb::parallel_for(std::size_t{0}, clips_.size(),
+                    [&](std::size_t c) { parts[c] = clip_error(clips_[c], decoded[c], 0, clips_[c].frames, 0); });
   ClipErrorSums out;
   for (const ClipErrorSums& part : parts) out.add(part);
   return out;

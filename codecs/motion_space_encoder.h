@@ -1,5 +1,5 @@
-// The encoder of the motion-space codec, in steps that a search for a target repeats: prepare once, plan for a metric and
-// a rough step, then attempt at a step. Private to this folder.
+// The encoder of the motion-space codec, in steps that a search for a target repeats: prepare once, plan for a metric
+// and a rough step, then attempt at a step. Private to this folder.
 #pragma once
 
 #include <span>
@@ -13,10 +13,10 @@ namespace kinespace {
 
 struct MotionSpaceSettings {
   double shell_weight = 0.03;
-  double rate_weight = 0.14;  // lambda: squared steps that a bit is worth. dD/dR of white noise is 0.1155 at high rates
+  double rate_weight = 0.18;  // lambda: squared steps that a bit is worth. dD/dR of white noise is 0.1155 at high rates
   double window_s = 0;        // fixed windows of so many seconds; 0: as time_blocks.h plans
   int group_frames = 4096;
-  int sample = 1;             // every so many groups only, for estimates
+  int sample = 1;  // every so many groups only, for estimates
 };
 
 // The result of coding at one step.
@@ -36,6 +36,8 @@ class MotionSpaceEncoder {
 
   // Cuts the clips into windows and transforms them, for about this step.
   void plan(double step, const MotionSpaceSettings& settings);
+  // The same windows with another shell weight.
+  void weigh_again(const MotionSpaceSettings& settings);
   // Codes at a step. `learned`: an attempt at a step near it, whose models are the start. `finer`: by window.
   [[nodiscard]] Attempt attempt(double step, const MotionSpaceSettings& settings, const Attempt* learned,
                                 std::span<const int> finer = {}) const;
@@ -49,8 +51,12 @@ class MotionSpaceEncoder {
   void add_moments();
   void add_metrics();
   void cut(std::size_t clip, double step, const MotionSpaceSettings& settings);
-  void choose_basis(double step, double shell_weight, MotionSpaceTables& tables, Eigen::MatrixXd& mixing) const;
-  [[nodiscard]] double gain_of(int component, double step) const;
+  void weigh(double shell_weight);
+  void transform();
+  void choose_basis(std::span<const std::size_t> windows, MotionSpaceTables& tables, Eigen::MatrixXd& mixing) const;
+  [[nodiscard]] double gain_of(int component, double step, std::span<const std::size_t> windows) const;
+  void scale(std::size_t w, const WindowPlace& window, const Eigen::MatrixXd& mixing,
+             std::vector<double>& wanted) const;
   void code_groups(Coding& coding, const MotionSpaceSettings& settings, bool measure) const;
 
   std::span<const Clip> clips_;
@@ -63,8 +69,8 @@ class MotionSpaceEncoder {
   PoseMetric metrics_;       // mean over sampled poses
   Eigen::MatrixXd metric_;
   KarhunenLoeve exact_;
-  std::vector<std::size_t> first_window_;              // by clip, and the end
-  std::vector<std::vector<double>> coefficients_;      // by window: [component][point], all functions, exact basis
+  std::vector<std::size_t> first_window_;          // by clip, and the end
+  std::vector<std::vector<double>> coefficients_;  // by window: [component][point], all functions, exact basis
 };
 
 // The finished stream.

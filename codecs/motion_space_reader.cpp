@@ -108,7 +108,8 @@ class MotionSpaceReader final : public StreamReader {
   [[nodiscard]] std::int64_t most_frames() const { return 65536 + 256 * static_cast<std::int64_t>(stream_.size()); }
 
   void check_range(std::size_t clip, int first, int count) const {
-    const bool there = clip < table_.clips.size() && first >= 0 && count >= 1 && first <= table_.clips[clip].frames - count;
+    const bool there =
+        clip < table_.clips.size() && first >= 0 && count >= 1 && first <= table_.clips[clip].frames - count;
     if (there) return;
     throw Error(ErrorKind::usage, {.file = stream_.source(),
                                    .found = fmt::format("frames {} to {} of clip {}", first, first + count, clip),
@@ -136,13 +137,15 @@ class MotionSpaceReader final : public StreamReader {
     std::vector<CoefficientBlock> blocks;
     for (std::size_t i = 0; i < group.count; ++i) {
       const WindowPlace& window = layout_.windows[group.first + i];
-      blocks.push_back({.functions = window.functions,
-                        .edges = window.edges,
-                        .follows = window.follows,
-                        .values = std::span(out.values)
-                                      .subspan(out.offsets[i], components * static_cast<std::size_t>(window.functions))});
+      blocks.push_back(
+          {.functions = window.functions,
+           .edges = window.edges,
+           .follows = window.follows,
+           .values =
+               std::span(out.values).subspan(out.offsets[i], components * static_cast<std::size_t>(window.functions))});
     }
-    const std::size_t wanted = level < 0 ? layers_[g].size() : std::min(layers_[g].size(), static_cast<std::size_t>(level));
+    const std::size_t wanted =
+        level < 0 ? layers_[g].size() : std::min(layers_[g].size(), static_cast<std::size_t>(level));
     decode_group(blocks, tables_.coding, std::span(layers_[g]).first(wanted), stream_.source());
     static_cast<void>(windows);
     return out;

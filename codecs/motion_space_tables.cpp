@@ -166,8 +166,8 @@ void WindowSynthesis::synthesise(const WindowPlace& window, std::span<const doub
     longest = std::max(longest, n);
     if (n == 0) continue;
     for (std::size_t d = 0; d < dimensions; ++d) {
-      add_scaled(row.data(), scale * basis_(static_cast<Eigen::Index>(d), c), scratch.coefficients.data() + d * functions,
-                 n);
+      add_scaled(row.data(), scale * basis_(static_cast<Eigen::Index>(d), c),
+                 scratch.coefficients.data() + d * functions, n);
     }
   }
   if (longest == 0) {
@@ -176,7 +176,8 @@ void WindowSynthesis::synthesise(const WindowPlace& window, std::span<const doub
   }
   const auto natural = functions_->get(window.points, window.functions);
   for (std::size_t d = 0; d < dimensions; ++d) {
-    natural->synthesise(std::span(scratch.coefficients).subspan(d * functions, longest), out.subspan(d * points, points));
+    natural->synthesise(std::span(scratch.coefficients).subspan(d * functions, longest),
+                        out.subspan(d * points, points));
   }
 }
 

@@ -130,8 +130,7 @@ ReferencePoseBuilder::ReferencePoseBuilder(const Skeleton& skeleton)
 
 void ReferencePoseBuilder::add(const ClipCurves& curves) {
   const CoarsePlacement placement = place(curves);
-  const Eigen::Quaterniond turn =
-      placement.turn().conjugate() * about_vertical(curves.placement.heading_rad);
+  const Eigen::Quaterniond turn = placement.turn().conjugate() * about_vertical(curves.placement.heading_rad);
   const std::vector<double> heading = headings(curves, turn);
   for (int f = 0; f < curves.frames(); ++f) {
     for (std::size_t j = 0; j < sums_.size(); ++j) {
@@ -163,8 +162,9 @@ PoseVectors pose_vectors(const ClipCurves& curves, const ReferencePose& referenc
   PoseVectors out{.frames = curves.frames(), .placement = place(curves), .side_tracks = curves.side_tracks};
   const auto n = static_cast<std::size_t>(out.frames);
   if (!curves.values.allFinite()) {
-    throw Error(ErrorKind::bad_input,
-                {.file = curves.name, .found = "a value that is no number", .expected = "finite rotations and positions"});
+    throw Error(
+        ErrorKind::bad_input,
+        {.file = curves.name, .found = "a value that is no number", .expected = "finite rotations and positions"});
   }
   out.values.resize(static_cast<std::size_t>(reference.dimensions()) * n);
   const Eigen::Quaterniond back = out.placement.turn().conjugate();
@@ -174,8 +174,7 @@ PoseVectors pose_vectors(const ClipCurves& curves, const ReferencePose& referenc
   std::ranges::copy(heading, out.values.begin() + static_cast<std::ptrdiff_t>(3 * n));
   for (std::size_t f = 0; f < n; ++f) {
     const Eigen::Vector3d travel = 100 * curves.values.row(static_cast<Eigen::Index>(f)).head<3>().transpose();
-    const Eigen::Vector3d p =
-        back * (curves.placement.start_cm + from_curves * travel - out.placement.start_cm());
+    const Eigen::Vector3d p = back * (curves.placement.start_cm + from_curves * travel - out.placement.start_cm());
     for (std::size_t k = 0; k < 3; ++k) out.values[k * n + f] = p[static_cast<Eigen::Index>(k)];
   }
   std::vector<bool> jumps(n, false);
@@ -242,8 +241,7 @@ void PoseWriter::write_root(std::span<const double> vectors, int first, int coun
   auto& travel = clip_.require_translation_track(root).values;
   for (std::size_t i = 0; i < n; ++i) {
     const int f = first + static_cast<int>(i);
-    const Eigen::Vector3d position =
-        start_ + turn_ * Eigen::Vector3d(vectors[i], vectors[n + i], vectors[2 * n + i]);
+    const Eigen::Vector3d position = start_ + turn_ * Eigen::Vector3d(vectors[i], vectors[n + i], vectors[2 * n + i]);
     const Eigen::Quaterniond rotation = turn_ * about_vertical(vectors[3 * n + i]) * clip_.rotation(root, f);
     Eigen::Vector3d base = Eigen::Vector3d::Zero();
     Eigen::Quaterniond base_turn = Eigen::Quaterniond::Identity();

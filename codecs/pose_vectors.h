@@ -1,14 +1,14 @@
 // A clip as curves that a linear codec can take apart, and back: one vector of numbers a frame,
 //
 //   0 1 2      position of the travel root in cm
-//   3          heading in radians: the root's turn about the vertical, unwrapped, smooth where the root hangs upside down
-//   4 + 3 j .. the turn of rotating joint j from its reference orientation, as 4 tan(angle / 4) times the axis
+//   3          heading in radians: the root's turn about the vertical, unwrapped, smooth where the root hangs upside
+//   down 4 + 3 j .. the turn of rotating joint j from its reference orientation, as 4 tan(angle / 4) times the axis
 //              (modified Rodrigues parameters: a rotation vector near zero, and back to a quaternion without sine,
 //              cosine or root); the root's without its heading
 //
-// in the clip's own frame: turned about the vertical and moved by a coarse Placement (steps of 1/128 turn, 8 cm), so that
-// clips that walk off in different directions look alike. What the vectors do not carry (joints above the travel root,
-// translations of other joints) goes beside them as side tracks (fpca/curves.h).
+// in the clip's own frame: turned about the vertical and moved by a coarse Placement (steps of 1/128 turn, 8 cm), so
+// that clips that walk off in different directions look alike. What the vectors do not carry (joints above the travel
+// root, translations of other joints) goes beside them as side tracks (fpca/curves.h).
 //
 // The parameters of a joint run to infinity at a full turn from its reference. Long before that, beyond 210 degrees,
 // the other quaternion of the same rotation takes over: its curves jump there, at a frame that is named in `jumps`, and
@@ -28,7 +28,8 @@
 
 namespace kinespace {
 
-// The reference orientations of the rotating joints, on a grid of 1/127 in x, y, z, so that three bytes a joint tell them.
+// The reference orientations of the rotating joints, on a grid of 1/127 in x, y, z, so that three bytes a joint tell
+// them.
 struct ReferencePose {
   std::vector<std::array<std::int8_t, 3>> steps;  // w is what makes it a unit quaternion, >= 0
 

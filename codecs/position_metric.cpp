@@ -35,8 +35,9 @@ Rotation parameter_velocity(const Eigen::Vector3d& m) {
 struct Posture {
   std::vector<Eigen::Vector3d> position;
   std::vector<Rotation> rotation;
-  std::vector<Rotation> axes;          // by rotating joint: world axes of its three parameters
-  std::vector<std::vector<int>> above;  // by joint: the rotating joints (numbers in the layout) that turn it, itself too
+  std::vector<Rotation> axes;  // by rotating joint: world axes of its three parameters
+  std::vector<std::vector<int>>
+      above;  // by joint: the rotating joints (numbers in the layout) that turn it, itself too
 };
 
 Posture stand(const Skeleton& skeleton, const ReferencePose& reference, std::span<const double> pose) {
@@ -93,9 +94,9 @@ class PointSums {
     }
     for (std::size_t b = 0; b < columns_.size(); ++b) {
       for (std::size_t a = 0; a <= b; ++a) {
-        sum(columns_[b], columns_[a]) += weight * (derivative_[a].x() * derivative_[b].x() +
-                                                   derivative_[a].y() * derivative_[b].y() +
-                                                   derivative_[a].z() * derivative_[b].z());
+        sum(columns_[b], columns_[a]) +=
+            weight * (derivative_[a].x() * derivative_[b].x() + derivative_[a].y() * derivative_[b].y() +
+                      derivative_[a].z() * derivative_[b].z());
       }
     }
   }
@@ -134,8 +135,7 @@ Eigen::MatrixXd PoseMetric::combined(double shell_weight) const {
 }
 
 Eigen::MatrixXd PoseMetric::lifted(double shell_weight) const {
-  static const double lift = getenv("LIFT") ? atof(getenv("LIFT")) : 0.1;
-  return lift_diagonal(positions + shell_weight * shell, lift);
+  return lift_diagonal(positions + shell_weight * shell, 0.5);
 }
 
 PoseMetric pose_metric(const Skeleton& skeleton, const ReferencePose& reference, std::span<const double> pose) {

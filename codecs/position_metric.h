@@ -3,8 +3,9 @@
 //   dx' M dx  ~  sum over joints |dp|^2  +  shell_weight * sum over joints 1/3 sum_k |d(p + 3 cm R e_k)|^2     (cm^2)
 //
 // to first order about a pose. The second part sees what positions do not: turns of hands, toes and of limbs about
-// their own axis (the shell error of motion/error_measures.h). Noise that is white where M is the identity is spread over
-// the pose so that a bit buys as much joint position as anywhere: a step's weight is how far it moves the joints below.
+// their own axis (the shell error of motion/error_measures.h). Noise that is white where M is the identity is spread
+// over the pose so that a bit buys as much joint position as anywhere: a step's weight is how far it moves the joints
+// below.
 #pragma once
 
 #include <span>

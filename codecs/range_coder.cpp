@@ -25,8 +25,11 @@ Bytes RangeEncoder::finish() && {
       break;
     }
   }
+  const std::size_t before = out_.size();
   for (int i = 0; i < 5; ++i) shift_low();
-  while (!out_.empty() && out_.back() == std::byte{0}) out_.pop_back();
+  // Of zeros only so many are left out that a decoder can tell a code from one that was cut short.
+  const std::size_t least = out_.size() > before + 4 ? out_.size() - 4 : before;
+  while (out_.size() > least && out_.back() == std::byte{0}) out_.pop_back();
   return std::move(out_);
 }
 

@@ -15,7 +15,8 @@ constexpr std::string_view kind_prefix = "codec:";
 
 void require_positive(const char* field, double value) {
   if (value > 0 && std::isfinite(value)) return;
-  throw Error(ErrorKind::usage, {.found = fmt::format("CodecTarget::{} = {}", field, value), .expected = "more than 0"});
+  throw Error(ErrorKind::usage,
+              {.found = fmt::format("CodecTarget::{} = {}", field, value), .expected = "more than 0"});
 }
 
 void check_settings(const Codec& codec, const CodecOptions& options) {

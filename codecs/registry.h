@@ -21,8 +21,8 @@ namespace kinespace {
 
 // Whether the bytes are a stream of clips, whole or the beginning of one.
 [[nodiscard]] bool is_clip_stream(std::span<const std::byte> bytes);
-// Opens a stream by the codec that made it; one that was cut short inside its levels of detail opens too. The bytes must
-// outlive the reader. Throws Error{bad_input}.
+// Opens a stream by the codec that made it; one that was cut short inside its levels of detail opens too. The bytes
+// must outlive the reader. Throws Error{bad_input}.
 [[nodiscard]] std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std::string source);
 
 }  // namespace kinespace

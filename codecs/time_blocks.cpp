@@ -58,7 +58,8 @@ double bits_of(std::span<const double> coefficients) {
 // One stretch without jumps.
 class StretchPlan {
  public:
-  StretchPlan(std::span<const double> curves, int curve_count, int frames, double rate_hz, const BlockPlanOptions& options)
+  StretchPlan(std::span<const double> curves, int curve_count, int frames, double rate_hz,
+              const BlockPlanOptions& options)
       : curves_(curves), curve_count_(curve_count), frames_(frames), rate_hz_(rate_hz), options_(options) {}
 
   void plan(int first, int last, std::vector<int>& lengths) {

@@ -1,4 +1,5 @@
-// Where a clip is cut into the windows that a codec transforms: as long as motion goes on alike, short where it changes.
+// Where a clip is cut into the windows that a codec transforms: as long as motion goes on alike, short where it
+// changes.
 //
 // The windows whose estimated bits are least (dynamic programming over window ends on a grid), where
 //
@@ -13,9 +14,9 @@
 namespace kinespace {
 
 struct BlockPlanOptions {
-  double grid_s = 0.5;         // window ends lie on multiples of this, in seconds, but for jumps and the end
-  int longest_frames = 512;    // of a window, 1 to longest_block (codecs/clip_table.h)
-  double window_bits = 40;     // what a window costs by itself
+  double grid_s = 0.5;       // window ends lie on multiples of this, in seconds, but for jumps and the end
+  int longest_frames = 512;  // of a window, 1 to longest_block (codecs/clip_table.h)
+  double window_bits = 40;   // what a window costs by itself
 };
 
 // `curves`: [curve][frame], scaled so that the quantiser's step is 1. `jumps`: frames where a window must begin.
