@@ -3,6 +3,7 @@
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "footskate/skate_measures.h"
 #include "motion/error_measures.h"
 #include "motion/read.h"
 
@@ -27,24 +28,33 @@ Json to_json(const MotionError& error) {
           {"channel_mse_deg2", error.channel_mse_deg2}};
 }
 
-void run_compare(const CompareOptions& options) {
+// The figures of the feet, null where no feet can be told.
+void add_skate(Json& result, const Clip& reference, const Clip& other, Session& session) {
+  const auto skate = compare_skate(reference, other);
+  if (!skate) session.note("no feet found: foot_slide_cm_s and floor_penetration_cm are not known");
+  result["foot_slide_cm_s"] = skate ? Json(skate->foot_slide_cm_s) : Json(nullptr);
+  result["floor_penetration_cm"] = skate ? Json(skate->floor_penetration_cm) : Json(nullptr);
+}
+
+void run_compare(const CompareOptions& options, Session& session) {
   const Clip reference = read_clip(options.reference);
   Session::check_stop();
   const Clip other = read_clip(options.other);
   Session::check_stop();
-  const Json result = to_json(compare(reference, other));
+  Json result = to_json(compare(reference, other));
+  add_skate(result, reference, other, session);
   options.json ? print_json(result) : print_fields(result);
 }
 
 }  // namespace
 
-void add_compare(CLI::App& app, Session& /*session*/) {
+void add_compare(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("compare", "How far clip B is from the reference clip A");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("A", options->reference, "The reference: .bvh or .amc")->required();
   command->add_option("B", options->other, "The clip to judge; joints are matched by name")->required();
   command->add_flag("--json", options->json, "Print the measures as one JSON object");
-  command->callback([options] { run_compare(*options); });
+  command->callback([options, &session] { run_compare(*options, session); });
 }
 
 }  // namespace kinespace::cli

@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 
+#include "footskate/contact_model.h"
 #include "motion/kinematics.h"
 
 namespace kinespace {
@@ -68,6 +69,24 @@ double largest_acceleration_cm_s2(const Clip& clip) {
     }
   }
   return largest * clip.rate_hz * clip.rate_hz;
+}
+
+std::optional<SkateFigures> compare_skate(const Clip& a, const Clip& b) {
+  const auto feet = find_feet(a);
+  if (!feet || a.frames != b.frames) return std::nullopt;
+  Feet other{.legs = {}, .root = b.skeleton.travel_root(), .leg_length_cm = feet->leg_length_cm};
+  for (std::size_t leg = 0; leg < 2; ++leg) {
+    const auto named = [&](int joint) { return joint < 0 ? -1 : b.skeleton.find(a.skeleton.joints[joint].name); };
+    const Leg& from = feet->legs[leg];
+    Leg& to = other.legs[leg];
+    to = {named(from.hip), named(from.knee), named(from.ankle), named(from.toe)};
+    if (to.hip < 0 || to.knee < 0 || to.ankle < 0) return std::nullopt;
+  }
+  const FootTracks reference = foot_tracks(a, *feet);
+  const FootTracks judged = foot_tracks(b, other);
+  const Ground ground = estimate_ground(reference);
+  return SkateFigures{.foot_slide_cm_s = foot_slide_cm_s(judged, ContactModel::standard().detect(reference, ground)),
+                      .floor_penetration_cm = floor_penetration_cm(judged, ground)};
 }
 
 }  // namespace kinespace
