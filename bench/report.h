@@ -52,9 +52,12 @@ struct Bench {
 
 // Every bench the command knows; each lives in bench/<name>.cpp. Throws Error{bad_input} when its data is missing.
 [[nodiscard]] BenchReport bench_dtw(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_filling(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_feet(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_fpca(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_io(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_kernels(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_playback(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_retrieval(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_search(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_transitions(const BenchOptions& options);
