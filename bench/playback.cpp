@@ -1,0 +1,135 @@
+// `kinespace bench playback`: what a full pose costs - the local rotations of all joints and the root's place - at
+// random times of random clips, with all coefficients in memory, on one core.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <random>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "bench/report.h"
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "fpca/library_builder.h"
+#include "motion/read.h"
+#include "synthesis/player.h"
+
+namespace kinespace {
+namespace {
+
+constexpr int poses = 20000;
+constexpr int rounds = 9;
+
+struct Played {
+  MotionSpace space;
+  std::vector<EncodedClip> clips;
+  std::vector<Player> players;
+};
+
+Played load(const std::filesystem::path& folder) {
+  const auto files = find_motion_files({folder});
+  std::vector<PreparedClip> clips(files.size());
+  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = prepare(read_clip(files[i])); });
+  BuiltSpace built = build_space(source_of(clips), {});
+  Played out{std::move(built.space), {}, {}};
+  const auto basis = std::make_shared<const PlaybackBasis>(out.space);
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    ClipCurves curves = clips[i].curves;
+    out.space.apply_references(curves.values);
+    out.clips.push_back(encode(out.space, curves, clips[i].runs, built.warps[i]));
+    out.players.emplace_back(basis, out.clips.back());
+  }
+  return out;
+}
+
+struct Moment {
+  std::size_t player = 0;
+  double time_s = 0;
+};
+
+// Times spread over all motion, in random order.
+std::vector<Moment> random_moments(const Played& played) {
+  std::mt19937 generator(1);
+  std::vector<double> seconds;
+  for (const Player& player : played.players) seconds.push_back(player.duration_s());
+  std::discrete_distribution<std::size_t> which(seconds.begin(), seconds.end());
+  std::vector<Moment> out(poses);
+  for (Moment& m : out) {
+    m.player = which(generator);
+    m.time_s = std::uniform_real_distribution<double>(0, seconds[m.player])(generator);
+  }
+  return out;
+}
+
+// Microseconds a pose: the least mean of the rounds.
+double time_poses(const std::vector<Moment>& moments, std::span<float> rotations,
+                  const std::function<float(const Moment&)>& pose) {
+  double least = 1e9;
+  float sum = 0;
+  for (int round = 0; round < rounds; ++round) {
+    const auto start = std::chrono::steady_clock::now();
+    for (const Moment& m : moments) sum += pose(m) + rotations[0];
+    least = std::min(least, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  }
+  return std::isfinite(sum) ? least / static_cast<double>(moments.size()) * 1e6 : -1;
+}
+
+// Largest difference from decode() over the frames of some clips: of the root in cm.
+double difference_cm(const Played& played, int functions) {
+  double largest = 0;
+  for (std::size_t i = 0; i < played.clips.size(); i += 5) {
+    const EncodedClip& clip = played.clips[i];
+    const ClipCurves curves = decode(played.space, clip, functions);
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(curves.placement.heading_rad, Eigen::Vector3d::UnitY()));
+    std::vector<float> rotations(4 * static_cast<std::size_t>(played.players[i].joints()));
+    for (int f = 0; f < clip.frames; ++f) {
+      const Eigen::Vector3f root = played.players[i].pose(f / clip.rate_hz, functions, rotations);
+      const Eigen::Vector3d wanted =
+          curves.placement.start_cm + turn * Eigen::Vector3d(100 * curves.values.row(f).head<3>().transpose());
+      largest = std::max(largest, (wanted - root.cast<double>()).norm());
+    }
+  }
+  return largest;
+}
+
+}  // namespace
+
+BenchReport bench_playback(const BenchOptions& options) {
+  const Played played = load(options.data / "cmu");
+  const std::vector<Moment> moments = random_moments(played);
+  BenchReport report{.bench = "playback", .device = "cpu", .threads = 1, .results = {}};
+  const std::string data = fmt::format("cmu, {} rotating joints", played.players.front().joints());
+  const auto add = [&](const std::string& name, double value, const std::string& unit,
+                       std::optional<double> bar = std::nullopt) {
+    report.results.push_back({.name = name, .data = data, .value = value, .unit = unit, .bar = bar});
+  };
+  std::vector<float> rotations(4 * static_cast<std::size_t>(played.players.front().joints()));
+  for (const int functions : {1, 3, 5, 10, -1}) {
+    const double cost = time_poses(moments, rotations, [&](const Moment& m) {
+      return played.players[m.player].pose(m.time_s, functions, rotations).x();
+    });
+    // ACL decodes a pose in 0.25 to 0.5 microseconds.
+    add(functions < 0 ? fmt::format("a pose at all {} functions", played.space.functions())
+                      : fmt::format("a pose at {} functions", functions),
+        cost, "us", functions == 5 ? std::optional(0.5) : std::nullopt);
+  }
+  add("a pose at 5 functions, plain loops",
+      time_poses(
+          moments, rotations,
+          [&](const Moment& m) { return reference::pose(played.players[m.player], m.time_s, 5, rotations).x(); }),
+      "us");
+  for (const int functions : {5, -1}) {
+    add(fmt::format("root against decoding, {} functions", functions < 0 ? played.space.functions() : functions),
+        difference_cm(played, functions), "cm", 0.01);
+  }
+  return report;
+}
+
+}  // namespace kinespace
