@@ -160,18 +160,25 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-// Whether any joint of a leg rests at each frame.
-std::vector<char> resting(const std::vector<Rest>& rests, int leg, int frames) {
-  std::vector<char> out(frames, 0);
+// The height of the lowest resting joint of a leg at each frame; infinite: none rests.
+std::vector<double> resting_heights(const std::vector<Rest>& rests, int leg, int frames) {
+  std::vector<double> out(frames, std::numeric_limits<double>::infinity());
   for (const Rest& r : rests) {
-    if (r.slot / 2 == leg) std::fill(out.begin() + r.first_frame, out.begin() + r.last_frame + 1, 1);
+    if (r.slot / 2 != leg) continue;
+    for (int f = r.first_frame; f <= r.last_frame; ++f) out[f] = std::min(out[f], r.place.y());
   }
   return out;
 }
 
-bool bears_alone(const Rest& rest, const std::vector<char>& other_rests) {
-  return std::any_of(other_rests.begin() + rest.first_frame, other_rests.begin() + rest.last_frame + 1,
-                     [](char rests) { return rests == 0; });
+// Alone at some time, or never above the other foot by more than `band`.
+bool bears(const Rest& rest, const std::vector<double>& own, const std::vector<double>& other, double band) {
+  bool alone = false;
+  bool above = false;
+  for (int f = rest.first_frame; f <= rest.last_frame; ++f) {
+    alone = alone || std::isinf(other[f]);
+    above = above || own[f] > other[f] + band;
+  }
+  return alone || !above;
 }
 
 }  // namespace
@@ -198,20 +205,18 @@ std::vector<Rest> find_rests(const FootTracks& tracks) {
 
 std::array<double, 4> standing_heights(const FootTracks& tracks, const Ground& ground) {
   std::array<double, 4> out{};
-  const std::vector<Rest> rests = find_rests(tracks);
-  for (int slot = 0; slot < 4; slot += 2) {
-    if (!tracks.has(slot + 1)) continue;
-    std::vector<double> heights;
-    for (const Rest& r : rests) {
-      if (r.slot != slot) continue;
-      for (int f = r.first_frame; f <= r.last_frame; ++f) {
-        const double toe = tracks.at[slot + 1][f].y();
-        const double level = ground.kind == GroundKind::uneven ? toe : ground.at(tracks.at[slot][f]);
-        heights.push_back(tracks.at[slot][f].y() - level);
-      }
+  std::array<std::vector<double>, 2> heights;
+  const double band = 0.05 * tracks.feet.leg_length_cm;
+  for (const Rest& r : find_rests(tracks)) {
+    if (r.slot % 2 != 0 || !tracks.has(r.slot + 1)) continue;
+    for (int f = r.first_frame; f <= r.last_frame; ++f) {
+      const Eigen::Vector3d& toe = tracks.at[r.slot + 1][f];
+      if (ground.kind != GroundKind::uneven && std::abs(toe.y() - ground.at(toe)) > band) continue;
+      const double level = ground.kind == GroundKind::uneven ? toe.y() : ground.at(tracks.at[r.slot][f]);
+      heights[r.slot / 2].push_back(tracks.at[r.slot][f].y() - level);
     }
-    out[slot] = median(std::move(heights));
   }
+  for (std::size_t leg = 0; leg < 2; ++leg) out[2 * leg] = median(heights[heights[leg].empty() ? 1 - leg : leg]);
   return out;
 }
 
@@ -219,10 +224,10 @@ std::vector<Rest> bearing_rests(const FootTracks& tracks, const Ground& ground) 
   const double band = 0.05 * tracks.feet.leg_length_cm;
   const auto stand = standing_heights(tracks, ground);
   std::vector<Rest> rests = find_rests(tracks);
-  const std::array<std::vector<char>, 2> leg_rests = {resting(rests, 0, tracks.frames),
-                                                      resting(rests, 1, tracks.frames)};
+  const std::array<std::vector<double>, 2> heights = {resting_heights(rests, 0, tracks.frames),
+                                                      resting_heights(rests, 1, tracks.frames)};
   std::erase_if(rests, [&](const Rest& r) {
-    if (ground.kind == GroundKind::uneven) return !bears_alone(r, leg_rests[1 - r.slot / 2]);
+    if (ground.kind == GroundKind::uneven) return !bears(r, heights[r.slot / 2], heights[1 - r.slot / 2], band);
     return std::abs(r.place.y() - ground.at(r.place) - stand[r.slot]) > band;
   });
   return rests;

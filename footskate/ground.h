@@ -52,12 +52,12 @@ struct Rest {
 [[nodiscard]] std::vector<Rest> find_rests(const FootTracks& tracks);
 
 // Those of them that bear the body on this ground: at its level (ankles at theirs) within 5 % of the leg length; on
-// uneven ground at any level, if at some time in the rest the other foot has none. A foot held still in the air never
-// bears the body.
+// uneven ground at any level, if at some time in the rest the other foot has none, or is never clearly lower. A foot
+// held still in the air never bears the body.
 [[nodiscard]] std::vector<Rest> bearing_rests(const FootTracks& tracks, const Ground& ground);
 
-// The height of each slot over the ground while its foot stands flat, cm: the median over rests; 0 for toes. Ankles of
-// a foot without toes: 0.
+// The height of each slot over the ground while its foot stands flat, cm: the median over rests
+// whose toe is on the ground; 0 for toes, and for ankles of feet without them.
 [[nodiscard]] std::array<double, 4> standing_heights(const FootTracks& tracks, const Ground& ground);
 
 [[nodiscard]] Ground estimate_ground(const FootTracks& tracks);
