@@ -25,7 +25,7 @@ namespace kinespace {
 namespace {
 
 constexpr int poses = 20000;
-constexpr int rounds = 9;
+constexpr int rounds = 25;
 
 struct Played {
   MotionSpace space;
@@ -120,6 +120,13 @@ BenchReport bench_playback(const BenchOptions& options) {
                       : fmt::format("a pose at {} functions", functions),
         cost, "us", functions == 5 ? std::optional(0.5) : std::nullopt);
   }
+  // Times of one clip: what the computation takes without the wait for memory.
+  std::vector<Moment> of_one = moments;
+  for (Moment& m : of_one) m = {.player = 0, .time_s = std::fmod(m.time_s, played.players.front().duration_s())};
+  add("a pose at 5 functions, one clip alone",
+      time_poses(of_one, rotations,
+                 [&](const Moment& m) { return played.players[m.player].pose(m.time_s, 5, rotations).x(); }),
+      "us");
   add("a pose at 5 functions, plain loops",
       time_poses(
           moments, rotations,

@@ -39,11 +39,14 @@ SampleMatrix cell_coefficients(const SampleMatrix& samples) {
   return out;
 }
 
-// Appends `rows`, each padded with zeros to `padded`.
-void append(const SampleMatrix& rows, int padded, std::vector<float>& out) {
+// Appends the entries of one block from `rows`, zeros where there are none.
+template <typename Rows>
+void append(const Rows& rows, int block, AlignedVector<float>& out) {
+  constexpr Eigen::Index lanes = PlaybackBasis::lanes;
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-    for (Eigen::Index k = 0; k < rows.cols(); ++k) out.push_back(static_cast<float>(rows(i, k)));
-    out.resize(out.size() + static_cast<std::size_t>(padded - rows.cols()), 0.0F);
+    for (Eigen::Index k = block * lanes; k < (block + 1) * lanes; ++k) {
+      out.push_back(k < rows.cols() ? static_cast<float>(rows(i, k)) : 0.0F);
+    }
   }
 }
 
@@ -67,22 +70,25 @@ std::vector<SampleMatrix> integrals_of(const SampleMatrix& entries) {
 PlaybackBasis::PlaybackBasis(const MotionSpace& space, int functions)
     : functions_(functions < 0 ? space.functions() : std::min(functions, space.functions())),
       points_(space.points()),
-      padded_((functions_ + 1 + lanes - 1) / lanes * lanes),
+      blocks_((functions_ + 1 + lanes - 1) / lanes),
       by_component_(space.options().grouping != Grouping::per_joint_component),
       one_velocity_group_(space.group_of(0) == space.group_of(1)) {
   for (int c = 0; c < space.curves(); ++c) group_of_.push_back(space.group_of(c));
   for (const FunctionGroup& group : space.groups()) {
-    append(cell_coefficients(entries_of(group, functions_)), padded_, values_);
+    const SampleMatrix cubics = cell_coefficients(entries_of(group, functions_));
+    for (int block = 0; block < blocks_; ++block) append(cubics, block, values_);
   }
   for (int axis = 0; axis < (one_velocity_group_ ? 1 : 3); ++axis) {
     const FunctionGroup& group = space.groups()[static_cast<std::size_t>(space.group_of(axis))];
     const std::vector<SampleMatrix> integrals = integrals_of(entries_of(group, functions_));
     std::vector<SampleMatrix> cubics;
     for (const SampleMatrix& integral : integrals) cubics.push_back(cell_coefficients(integral));
-    for (Eigen::Index cell = 0; cell + 1 < points_; ++cell) {
-      for (const SampleMatrix& cubic : cubics) append(cubic.middleRows(4 * cell, 4), padded_, integrals_);
+    for (int block = 0; block < blocks_; ++block) {
+      for (Eigen::Index cell = 0; cell + 1 < points_; ++cell) {
+        for (const SampleMatrix& c : cubics) append(c.middleRows(4 * cell, 4), block, integrals_);
+      }
+      for (const SampleMatrix& integral : integrals) append(integral.bottomRows(1), block, ends_);
     }
-    for (const SampleMatrix& integral : integrals) append(integral.bottomRows(1), padded_, ends_);
   }
 }
 

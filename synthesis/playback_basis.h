@@ -15,6 +15,7 @@
 #include <span>
 #include <vector>
 
+#include "base/aligned.h"
 #include "fpca/motion_space.h"
 #include "fpca/warp.h"
 
@@ -34,34 +35,46 @@ class PlaybackBasis {
   [[nodiscard]] int group_of(int curve) const { return group_of_[static_cast<std::size_t>(curve)]; }
   // Whether the same components of all joints share functions, as they do in the two coarser groupings.
   [[nodiscard]] bool by_component() const { return by_component_; }
-  // Entries of a table, mean first, rounded up to lanes; those beyond functions() are 0.
-  [[nodiscard]] int padded() const { return padded_; }
+  // Entries, mean first, stand in blocks of `lanes`; those beyond functions() are 0. The leading block of all cells is
+  // in one piece, so that poses of few functions need little of the cache.
+  [[nodiscard]] int blocks() const { return blocks_; }
+  [[nodiscard]] int padded() const { return blocks_ * lanes; }
 
-  // Coefficients of 1, b, b^2, b^3, `padded` floats each, of the functions of a group between points i and i + 1.
-  [[nodiscard]] const float* values(int group, int cell) const {
-    return values_.data() + (static_cast<std::size_t>(group) * cells() + static_cast<std::size_t>(cell)) * 4 * width();
+  // Coefficients of 1, b, b^2, b^3, `lanes` floats each, of a block of a group between points i and i + 1.
+  [[nodiscard]] const float* values(int group, int block, int cell) const {
+    return values_.data() + at(static_cast<std::size_t>(group), block, cell) * cubic;
   }
+  // From one block to the next.
+  [[nodiscard]] std::ptrdiff_t values_stride() const { return static_cast<std::ptrdiff_t>(cells() * cubic); }
   // The same of the integrals of the group that curve 0 .. 2 belongs to: warp_terms times four.
-  [[nodiscard]] const float* integrals(int axis, int cell) const {
-    return integrals_.data() + (slot(axis) * cells() + static_cast<std::size_t>(cell)) * warp_terms * 4 * width();
+  [[nodiscard]] const float* integrals(int axis, int block, int cell) const {
+    return integrals_.data() + at(slot(axis), block, cell) * cubic * warp_terms;
   }
-  // Integrals over all of [0, 1]: [warp term][padded].
-  [[nodiscard]] const float* ends(int axis) const { return ends_.data() + slot(axis) * warp_terms * width(); }
+  [[nodiscard]] std::ptrdiff_t integrals_stride() const { return values_stride() * warp_terms; }
+  // Integrals over all of [0, 1]: [warp term][lane], block after block.
+  [[nodiscard]] const float* ends(int axis, int block) const {
+    return ends_.data() +
+           (slot(axis) * static_cast<std::size_t>(blocks_) + static_cast<std::size_t>(block)) * warp_terms * lanes;
+  }
 
  private:
+  static constexpr std::size_t cubic = 4 * lanes;
   [[nodiscard]] std::size_t cells() const { return static_cast<std::size_t>(points_) - 1; }
-  [[nodiscard]] std::size_t width() const { return static_cast<std::size_t>(padded_); }
+  [[nodiscard]] std::size_t at(std::size_t table, int block, int cell) const {
+    return (table * static_cast<std::size_t>(blocks_) + static_cast<std::size_t>(block)) * cells() +
+           static_cast<std::size_t>(cell);
+  }
   [[nodiscard]] std::size_t slot(int axis) const { return one_velocity_group_ ? 0 : static_cast<std::size_t>(axis); }
 
   int functions_ = 0;
   int points_ = 0;
-  int padded_ = 0;
+  int blocks_ = 0;
   bool by_component_ = false;
   bool one_velocity_group_ = false;
   std::vector<int> group_of_;
-  std::vector<float> values_;
-  std::vector<float> integrals_;
-  std::vector<float> ends_;
+  AlignedVector<float> values_;
+  AlignedVector<float> integrals_;
+  AlignedVector<float> ends_;
 };
 
 }  // namespace kinespace

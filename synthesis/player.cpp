@@ -15,6 +15,7 @@ namespace {
 constexpr int lanes = PlaybackBasis::lanes;
 constexpr int most_entries = 1024 + 2 * lanes;  // functions of a space, and the mean
 using Vector = float __attribute__((vector_size(lanes * sizeof(float))));
+using Four = float __attribute__((vector_size(4 * sizeof(float))));
 using Indices = int __attribute__((vector_size(lanes * sizeof(int))));
 
 // A neighbouring cut's part in a pose: its corrections and by how much they count; none: nullptr.
@@ -27,7 +28,8 @@ struct CutPart {
 // All that a pose is computed from.
 struct PoseJob {
   int functions = 0;
-  int padded = 0;
+  std::ptrdiff_t values_stride = 0;
+  std::ptrdiff_t integrals_stride = 0;
   float b = 0;
   const float* values[4] = {};  // of the four components; often the same
   const float* integrals[3] = {};
@@ -43,61 +45,71 @@ struct PoseJob {
   int joints = 0;
   CutPart cuts[2];
   float* rotations = nullptr;
-  float place[3] = {};  // metres from the sequence's start
+  float place[4] = {};  // metres from the sequence's start
 };
 
-// out[0 .. count) += factor * cubic at b
-KINESPACE_SIMD_BODY void add_cubics(const float* cubic, int padded, int count, float b, float factor, float* out) {
-  for (int k = 0; k < count; k += lanes) {
-    Vector c0;
-    Vector c1;
-    Vector c2;
-    Vector c3;
-    Vector sum;
-    std::memcpy(&c0, cubic + k, sizeof(Vector));
-    std::memcpy(&c1, cubic + padded + k, sizeof(Vector));
-    std::memcpy(&c2, cubic + 2 * padded + k, sizeof(Vector));
-    std::memcpy(&c3, cubic + 3 * padded + k, sizeof(Vector));
-    std::memcpy(&sum, out + k, sizeof(Vector));
-    sum += factor * (c0 + b * (c1 + b * (c2 + b * c3)));
+// result = the cubics of a block at b. A macro, since vectors of this size are passed differently by different
+// instruction sets.
+#define KINESPACE_CUBICS(result, cubic, b)                    \
+  Vector result;                                              \
+  {                                                           \
+    Vector c[4];                                              \
+    std::memcpy(c, cubic, sizeof(c));                         \
+    (result) = c[0] + (b) * (c[1] + (b) * (c[2] + (b)*c[3])); \
+  }
+
+// The weights of the entries in the root's place: duration sum_j a_j (I_jk(s) - u I_jk(1)).
+KINESPACE_SIMD_BODY void place_weights(const PoseJob& job, int axis, float* out) {
+  const float* block = job.integrals[axis];
+  const float* ends = job.ends[axis];
+  for (int k = 0; k <= job.functions; k += lanes, block += job.integrals_stride) {
+    Vector sum{};
+    for (int j = 0; j < job.warp_terms; ++j) {
+      KINESPACE_CUBICS(integral, block + 4 * j * lanes, job.b)
+      Vector end;
+      std::memcpy(&end, ends + j * lanes, sizeof(Vector));
+      sum += (job.warp[j] * job.duration_s) * (integral - job.own * end);
+    }
+    ends += PlaybackBasis::warp_terms * lanes;
     std::memcpy(out + k, &sum, sizeof(Vector));
   }
 }
 
-KINESPACE_SIMD_BODY void clear(int count, float* out) {
-  const Vector zero{};
-  for (int k = 0; k < count; k += lanes) std::memcpy(out + k, &zero, sizeof(Vector));
-}
-
-// u travel + duration sum_j a_j sum_k x_k (I_jk(s) - u I_jk(1)): where the root is, so that it ends where it should.
+// Where the root is: u travel + sum_k weight_k x_k, so that it ends where it should.
 KINESPACE_SIMD_BODY void place_root(PoseJob& job) {
   alignas(64) float weights[most_entries];
-  const int count = job.functions + 1;
-  for (int axis = 0; axis < 3; ++axis) {
-    if (axis == 0 || job.integrals[axis] != job.integrals[0]) {
-      clear(count, weights);
-      for (int j = 0; j < job.warp_terms; ++j) {
-        const float factor = job.warp[j] * job.duration_s;
-        add_cubics(job.integrals[axis] + 4 * j * job.padded, job.padded, count, job.b, factor, weights);
-        const float* ends = job.ends[axis] + j * job.padded;
-        const float part = factor * job.own;
-        for (int k = 0; k < count; k += lanes) {
-          Vector w;
-          Vector end;
-          std::memcpy(&w, weights + k, sizeof(Vector));
-          std::memcpy(&end, ends + k, sizeof(Vector));
-          w -= part * end;
-          std::memcpy(weights + k, &w, sizeof(Vector));
-        }
-      }
+  place_weights(job, 0, weights);
+  const bool shared = job.integrals[1] == job.integrals[0] && job.integrals[2] == job.integrals[0];
+  Four sum = {};
+  if (shared) {
+    sum = Four{job.travel[0], job.travel[1], job.travel[2], 0} * job.own + weights[0];
+    for (int k = 1; k <= job.functions; ++k) {
+      Four x;
+      std::memcpy(&x, job.velocity_scores + static_cast<std::ptrdiff_t>(4) * (k - 1), sizeof(Four));
+      sum += weights[k] * x;
     }
-    float sum = job.own * job.travel[axis] + weights[0];
-    for (int k = 1; k < count; ++k) sum += weights[k] * job.velocity_scores[4 * (k - 1) + axis];
-    const std::ptrdiff_t slopes = 8 * static_cast<std::ptrdiff_t>(job.joint_lanes);
-    for (const CutPart& cut : job.cuts) {
-      if (cut.correction != nullptr) sum -= cut.slope * cut.correction[slopes + axis];
+  } else {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (axis > 0) place_weights(job, axis, weights);
+      sum[axis] = job.travel[axis] * job.own + weights[0];
+      for (int k = 1; k <= job.functions; ++k) sum[axis] += weights[k] * job.velocity_scores[4 * (k - 1) + axis];
     }
-    job.place[axis] = sum;
+  }
+  for (const CutPart& cut : job.cuts) {
+    if (cut.correction == nullptr) continue;
+    Four slope;
+    std::memcpy(&slope, cut.correction + 8 * static_cast<std::ptrdiff_t>(job.joint_lanes), sizeof(Four));
+    sum -= cut.slope * slope;
+  }
+  std::memcpy(job.place, &sum, sizeof(Four));
+}
+
+// The values of the functions of one component.
+KINESPACE_SIMD_BODY void function_values(const PoseJob& job, int component, float* out) {
+  const float* block = job.values[component];
+  for (int k = 0; k <= job.functions; k += lanes, block += job.values_stride) {
+    KINESPACE_CUBICS(value, block, job.b)
+    std::memcpy(out + k, &value, sizeof(Vector));
   }
 }
 
@@ -139,8 +151,7 @@ KINESPACE_SIMD_BODY void play_body(PoseJob& job) {
       weight[q] = weight[q - 1];
       continue;
     }
-    clear(count, weights[q]);
-    add_cubics(job.values[q], job.padded, count, job.b, 1, weights[q]);
+    function_values(job, q, weights[q]);
     weight[q] = weights[q];
   }
   for (int start = 0; start < job.joint_lanes; start += lanes) {
@@ -276,12 +287,13 @@ Eigen::Vector3f Player::pose(double time_s, int functions, std::span<float> rota
   const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
   PoseJob job;
   job.functions = parts.level(functions);
-  job.padded = basis.padded();
+  job.values_stride = basis.values_stride();
+  job.integrals_stride = basis.integrals_stride();
   job.b = place.b;
-  for (int q = 0; q < 4; ++q) job.values[q] = basis.values(basis.group_of(3 + q), place.cell);
+  for (int q = 0; q < 4; ++q) job.values[q] = basis.values(basis.group_of(3 + q), 0, place.cell);
   for (int axis = 0; axis < 3; ++axis) {
-    job.integrals[axis] = basis.integrals(axis, place.cell);
-    job.ends[axis] = basis.ends(axis);
+    job.integrals[axis] = basis.integrals(axis, 0, place.cell);
+    job.ends[axis] = basis.ends(axis, 0);
   }
   job.warp = sequence.warp.data();
   job.warp_terms = PlayerParts::warp_terms(sequence);
@@ -310,9 +322,11 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
   const int level = parts.level(functions);
   CutPart cuts[2];
   add_cut_parts(parts, place, level, cuts);
-  const int padded = basis.padded();
-  const auto cubic = [&](const float* c, int k) {
-    return c[k] + place.b * (c[padded + k] + place.b * (c[2 * padded + k] + place.b * c[3 * padded + k]));
+  const auto cubic = [&](const float* c) {
+    return c[0] + place.b * (c[lanes] + place.b * (c[2 * lanes] + place.b * c[3 * lanes]));
+  };
+  const auto value = [&](int curve, int k) {
+    return cubic(basis.values(basis.group_of(curve), k / lanes, place.cell) + k % lanes);
   };
 
   const auto own = static_cast<float>(place.own);
@@ -322,9 +336,9 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
     for (int k = 0; k <= level; ++k) {
       float weight = 0;
       for (int j = 0; j < PlayerParts::warp_terms(sequence); ++j) {
-        const float integral = cubic(basis.integrals(axis, place.cell) + 4 * j * padded, k);
+        const float integral = cubic(basis.integrals(axis, k / lanes, place.cell) + 4 * j * lanes + k % lanes);
         weight += sequence.warp[static_cast<std::size_t>(j)] * sequence.duration_s *
-                  (integral - own * basis.ends(axis)[j * padded + k]);
+                  (integral - own * basis.ends(axis, k / lanes)[j * lanes + k % lanes]);
       }
       sum += weight * (k == 0 ? 1.0F : parts.velocity_scores(sequence)[4 * (k - 1) + axis]);
     }
@@ -339,11 +353,11 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
   for (int joint = 0; joint < parts.joints; ++joint) {
     float q[4];
     for (int component = 0; component < 4; ++component) {
-      const float* values = basis.values(basis.group_of(3 + 4 * joint + component), place.cell);
+      const int curve = 3 + 4 * joint + component;
       const auto column = static_cast<std::size_t>(component * parts.lanes + joint);
-      float sum = cubic(values, 0);
+      float sum = value(curve, 0);
       for (int k = 1; k <= level; ++k) {
-        sum += cubic(values, k) * scores[static_cast<std::size_t>(k - 1) * parts.score_stride() + column];
+        sum += value(curve, k) * scores[static_cast<std::size_t>(k - 1) * parts.score_stride() + column];
       }
       for (const CutPart& cut : cuts) {
         if (cut.correction == nullptr) continue;

@@ -13,9 +13,10 @@ namespace {
 
 using Weights = std::vector<float>;  // [frame][entry]
 
-void evaluate(const float* cubic, int padded, float b, float factor, float* out) {
-  for (int k = 0; k < padded; ++k) {
-    const float value = cubic[k] + b * (cubic[padded + k] + b * (cubic[2 * padded + k] + b * cubic[3 * padded + k]));
+void evaluate(const float* cubic, float b, float factor, float* out) {
+  constexpr int lanes = PlaybackBasis::lanes;
+  for (int k = 0; k < lanes; ++k) {
+    const float value = cubic[k] + b * (cubic[lanes + k] + b * (cubic[2 * lanes + k] + b * cubic[3 * lanes + k]));
     out[k] += factor * value;
   }
 }
@@ -83,15 +84,22 @@ class GrowingSequence {
     Weights& out = weights_[static_cast<std::size_t>(c)];
     out.resize(out.size() + static_cast<std::size_t>(basis.padded()), 0.0F);
     float* row = out.data() + out.size() - basis.padded();
-    if (c >= 3) {
-      evaluate(basis.values(basis.group_of(c), place.cell), basis.padded(), place.b, 1, row);
-      return;
+    for (int block = 0; block < basis.blocks(); ++block, row += PlaybackBasis::lanes) {
+      if (c >= 3) {
+        evaluate(basis.values(basis.group_of(c), block, place.cell), place.b, 1, row);
+      } else {
+        add_integrals(place, c, block, row);
+      }
     }
+  }
+  void add_integrals(const PlayerParts::Place& place, int axis, int block, float* row) const {
+    constexpr int lanes = PlaybackBasis::lanes;
     const auto own = static_cast<float>(place.own);
     for (int j = 0; j < PlayerParts::warp_terms(sequence_); ++j) {
       const float factor = sequence_.warp[static_cast<std::size_t>(j)] * sequence_.duration_s;
-      evaluate(basis.integrals(c, place.cell) + 4 * j * basis.padded(), basis.padded(), place.b, factor, row);
-      for (int k = 0; k < basis.padded(); ++k) row[k] -= factor * own * basis.ends(c)[j * basis.padded() + k];
+      evaluate(parts_.basis->integrals(axis, block, place.cell) + 4 * j * lanes, place.b, factor, row);
+      const float* ends = parts_.basis->ends(axis, block) + j * lanes;
+      for (int k = 0; k < lanes; ++k) row[k] -= factor * own * ends[k];
     }
   }
 
@@ -155,7 +163,7 @@ void PlayerParts::add_sequence(const EncodedSequence& encoded, double rate, cons
   }
   out.scores = scores.size();
   const Eigen::Index functions = basis->functions();
-  scores.resize(scores.size() + static_cast<std::size_t>(functions) * (score_stride() + 4), 0.0F);
+  scores.resize(scores.size() + static_cast<std::size_t>(functions) * score_stride() + velocity_floats(), 0.0F);
   const Eigen::Index known = std::min(functions, encoded.scores.rows());
   float* velocity = scores.data() + out.scores + static_cast<std::size_t>(functions) * score_stride();
   for (Eigen::Index k = 0; k < known; ++k) {

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/aligned.h"
 #include "synthesis/player.h"
 
 namespace kinespace {
@@ -44,9 +45,9 @@ struct PlayerParts {
   float turn_cosine = 1;                               // of half its heading
   float turn_sine = 0;
   std::vector<Sequence> sequences;
-  std::vector<float> scores;
+  AlignedVector<float> scores;
   std::vector<float> inverse;  // value and slope of the warp's inverse at 0, 1/64, .., 1
-  std::vector<float> cuts;     // [level 0 .. functions][values 4 lanes, slopes 4 lanes, slopes of the root's place 4]
+  AlignedVector<float> cuts;   // [level 0 .. functions][values 4 lanes, slopes 4 lanes, slopes of the root's place 4]
   int bucket = 1;              // frames
   std::vector<int> at;         // the sequence at the first frame of each bucket
 
@@ -54,7 +55,12 @@ struct PlayerParts {
   [[nodiscard]] static const PlayerParts& of(const Player& player) { return *player.parts_; }
 
   [[nodiscard]] std::size_t score_stride() const { return 4 * static_cast<std::size_t>(lanes); }
-  [[nodiscard]] std::size_t cut_stride() const { return 2 * score_stride() + 4; }
+  [[nodiscard]] std::size_t cut_stride() const { return 2 * score_stride() + PlaybackBasis::lanes; }
+  // Of the velocity, four a function; rounded up, so that every sequence begins at a cache line.
+  [[nodiscard]] std::size_t velocity_floats() const {
+    return (4 * static_cast<std::size_t>(basis->functions()) + PlaybackBasis::lanes - 1) / PlaybackBasis::lanes *
+           PlaybackBasis::lanes;
+  }
   [[nodiscard]] const float* velocity_scores(const Sequence& sequence) const {
     return scores.data() + sequence.scores + static_cast<std::size_t>(basis->functions()) * score_stride();
   }

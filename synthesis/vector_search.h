@@ -25,6 +25,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/aligned.h"
 #include "kernels/matrix.h"
 
 namespace kinespace {
@@ -92,9 +93,9 @@ class VectorSearch {
   RowMatrix<float> rows_;          // weighted, by row; empty when not turned
   std::vector<int> levels_;        // numbers of coordinates after which a row's bound is looked at; the last: all
   std::vector<std::int32_t> ids_;  // [block][lane]; -1: no row
-  std::vector<float> values_;      // [block][coordinate][lane]
-  std::vector<float> rests_;       // [block][level][lane]
-  std::vector<float> boxes_;       // [16 blocks][low, high of each boxed dimension, then of the rest][block]
+  AlignedVector<float> values_;    // [block][coordinate][lane]
+  AlignedVector<float> rests_;     // [block][level][lane]
+  AlignedVector<float> boxes_;     // [16 blocks][low, high of each boxed dimension, then of the rest][block]
 };
 
 // The sum of (a_d - b_d)^2 in double: eight sums over d = i mod 8, added as ((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7)).
