@@ -43,7 +43,7 @@ struct FillOptions {
   int far_windows = 200;      // near_windows to 1000: of the estimate from many
   bool own_frames = true;     // windows of the clip itself, outside its gaps, count as the library's
   double max_gap_s = 4;       // 0.1 to 20: longer gaps are refused
-  int calibration_gaps = 96;  // 0 to 2000: gaps filled at each of a few lengths to learn how large errors are; 0: the
+  int calibration_gaps = 64;  // 0 to 2000: gaps filled at each of a few lengths to learn how large errors are; 0: the
                               // uncertainty is the model's own and too large or too small
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;

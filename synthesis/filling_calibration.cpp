@@ -66,22 +66,22 @@ std::vector<Miss> misses_of(const FillLibrary& library, const FillOptions& optio
     own.push_back(part_of(track, 0, gap));
     own.push_back(part_of(track, gap + shape.gap, track.frames() - gap - shape.gap));
   }
-  const GapEstimate estimate =
-      estimate_gap(library, options, query, shape, {.without = trial.track, .extra = own}, true);
-  if (estimate.windows == 0) return {};
+  const GapEstimate estimate = estimate_gap(library, options, query, shape, {.without = trial.track, .extra = own});
+  if (estimate.mean.rows() == 0) return {};
   FeatureMatrix truth(shape.frames(), library.curves());
   library.window(query, 0, shape, truth);
   std::vector<Miss> out;
   std::vector<Eigen::Vector3d> is;
   std::vector<Eigen::Vector3d> should;
   const auto first = static_cast<std::size_t>(library.layout().joints.front());
-  for (Index r = 0; r < estimate.mean.rows(); ++r) {
+  for (std::size_t i = 0; i < estimate.spread.rows.size(); ++i) {
+    const Index r = estimate.spread.rows[i];
     feature_positions(library, estimate.mean.row(r), is);
     feature_positions(library, truth.row(shape.before + r).cast<double>(), should);
     for (std::size_t j = first; j < is.size(); ++j) {
       Miss miss;
       for (std::size_t s = 0; s < miss.variance.size(); ++s) {
-        miss.variance[s] = estimate.spread.variance[s](r, static_cast<Index>(j));
+        miss.variance[s] = estimate.spread.variance[s](static_cast<Index>(i), static_cast<Index>(j));
       }
       for (int axis = 0; axis < 3; ++axis) {
         miss.error = is[j](axis) - should[j](axis);

@@ -41,20 +41,27 @@ Eigen::VectorXd by_joint(const Eigen::VectorXd& squares) {
 }
 
 GapSpread spread_of(const FillLibrary& library, const WindowEstimate& near, const WindowEstimate& far,
-                    const SampleMatrix& mean) {
-  const Index rows = mean.rows();
-  const Index joints = library.skeleton().joint_count();
-  GapSpread out;
-  for (auto& v : out.variance) v = Eigen::MatrixXd::Zero(rows, joints);
-  Eigen::MatrixXd modes(mean.cols(), static_cast<Index>(far.modes.size()));
-  for (Index r = 0; r < rows; ++r) {
-    const Eigen::MatrixXd slopes = position_slopes(library, mean.row(r));
-    for (Index k = 0; k < modes.cols(); ++k) modes.col(k) = far.modes[static_cast<std::size_t>(k)].row(r).transpose();
-    out.variance[0].row(r) = by_joint((slopes * modes).rowwise().squaredNorm()).transpose();
-    out.variance[1].row(r) = by_joint(slopes.rowwise().squaredNorm() * far.open_variance(r)).transpose();
-    const Eigen::VectorXd apart = slopes * (near.mean.row(r) - far.mean.row(r)).transpose() / 2;
-    out.variance[2].row(r) = by_joint(apart.cwiseAbs2()).transpose();
+                    const SampleMatrix& mean, std::vector<int> rows) {
+  GapSpread out{.rows = std::move(rows), .variance = {}};
+  const auto count = static_cast<Index>(out.rows.size());
+  for (auto& v : out.variance) v = Eigen::MatrixXd::Zero(count, library.skeleton().joint_count());
+  for (Index i = 0; i < count; ++i) {
+    const auto n = static_cast<std::size_t>(i);
+    const int r = out.rows[n];
+    const Eigen::MatrixXf slopes = position_slopes(library, mean.row(r)).cast<float>();
+    out.variance[0].row(i) = by_joint((slopes * far.modes[n]).rowwise().squaredNorm().cast<double>()).transpose();
+    out.variance[1].row(i) = by_joint(slopes.rowwise().squaredNorm().cast<double>() * far.open_variance(i)).transpose();
+    const Eigen::VectorXf apart = slopes * (near.mean.row(r) - far.mean.row(r)).transpose().cast<float>() / 2;
+    out.variance[2].row(i) = by_joint(apart.cwiseAbs2().cast<double>()).transpose();
   }
+  return out;
+}
+
+std::vector<int> spread_rows(const WindowShape& shape) {
+  constexpr int step = 3;
+  std::vector<int> out;
+  for (int r = 0; r < shape.gap - 1; r += step) out.push_back(r);
+  if (shape.gap > 0) out.push_back(shape.gap - 1);
   return out;
 }
 
@@ -86,11 +93,11 @@ void feature_positions(const FillLibrary& library, const Eigen::RowVectorXd& fea
 }
 
 GapEstimate estimate_gap(const FillLibrary& library, const FillOptions& options, const FillTrack& query,
-                         const WindowShape& shape, FillLibrary::Search search, bool with_spread) {
+                         const WindowShape& shape, FillLibrary::Search search) {
   search.count = options.far_windows;
   const std::vector<FillWindow> windows = library.nearest(query, shape, search);
   GapEstimate out{.mean = SampleMatrix(0, library.curves()), .spread = {}, .windows = static_cast<int>(windows.size())};
-  if (windows.empty()) return out;
+  if (windows.size() < 2) return out;
   const Index curves = library.curves();
   FeatureMatrix members(static_cast<Index>(windows.size()), shape.frames() * curves);
   std::vector<double> distances;
@@ -109,10 +116,11 @@ GapEstimate estimate_gap(const FillLibrary& library, const FillOptions& options,
   near.windows = options.near_windows;
   far.windows = options.far_windows;
   const SampleMatrix observed = seen.cast<double>();
-  const WindowEstimate a = estimate_window(members, distances, observed, shape, near, false);
-  const WindowEstimate b = estimate_window(members, distances, observed, shape, far, with_spread);
+  std::vector<int> rows = spread_rows(shape);
+  const WindowEstimate a = estimate_window(members, distances, observed, shape, near, {});
+  const WindowEstimate b = estimate_window(members, distances, observed, shape, far, rows);
   out.mean = (a.mean + b.mean) / 2;
-  if (with_spread) out.spread = spread_of(library, a, b, out.mean);
+  out.spread = spread_of(library, a, b, out.mean, std::move(rows));
   return out;
 }
 

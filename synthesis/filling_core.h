@@ -13,22 +13,24 @@
 
 namespace kinespace {
 
-// Sources of variance of joint positions, cm^2 on one axis (the mean of three): [row of the gap][joint].
+// Sources of variance of joint positions, cm^2 on one axis (the mean of three): [i][joint] for row rows[i] of the gap.
 struct GapSpread {
   static constexpr int sources = 3;
+  std::vector<int> rows;  // every 0.1 s, and the last
   // The scores that what is seen leaves open; the process beyond the windows; how far the two estimates are apart.
   std::array<Eigen::MatrixXd, sources> variance;
 };
 
 struct GapEstimate {
   SampleMatrix mean;  // [row of the gap][curve], features
-  GapSpread spread;   // empty unless asked for
+  GapSpread spread;
   int windows = 0;
 };
 
-// `query`: a track of shape.frames() frames. `search.count` is not looked at. No windows: an estimate of 0 windows.
+// `query`: a track of shape.frames() frames. `search.count` is not looked at. Fewer than 2 windows: no
+// mean.
 [[nodiscard]] GapEstimate estimate_gap(const FillLibrary& library, const FillOptions& options, const FillTrack& query,
-                                       const WindowShape& shape, FillLibrary::Search search, bool with_spread);
+                                       const WindowShape& shape, FillLibrary::Search search);
 
 // World positions (cm; ground position and heading of the features) of all joints for one row of features. Joints above
 // the travel root stand at the travel root.
@@ -44,7 +46,7 @@ struct FillCalibration {
   std::vector<Length> lengths;    // ascending; at least one
   std::vector<double> quantiles;  // [i]: not exceeded by a share (i + 1) / 100 of |error| / std; empty: normal
 
-  // Standard deviation [row][joint] in cm.
+  // Standard deviation [i][joint] in cm, rows as those of the spread.
   [[nodiscard]] Eigen::MatrixXd std_cm(const GapSpread& spread, double gap_s) const;
 };
 

@@ -61,7 +61,7 @@ Bridge bridge_of(const std::vector<int>& seen, const std::vector<int>& unseen, c
 
 WindowEstimate estimate_window(const FeatureMatrix& members, std::span<const double> distances,
                                const SampleMatrix& seen, const WindowShape& shape, const WindowPrior& prior,
-                               bool with_modes) {
+                               std::span<const int> spread_rows) {
   std::vector<int> o;
   std::vector<int> u;
   for (int r = 0; r < shape.frames(); ++r) (shape.seen(r) ? o : u).push_back(r);
@@ -98,10 +98,16 @@ WindowEstimate estimate_window(const FeatureMatrix& members, std::span<const dou
   const VectorXd scores = factor.solve(whitened * Eigen::Map<const VectorXd>(misfit.data(), misfit.size()));
   Eigen::Map<Eigen::RowVectorXd>(estimate.data(), estimate.size()) += scores.transpose() * beyond;
 
-  WindowEstimate out{.mean = std::move(estimate), .modes = {}, .open_variance = bridge.open};
-  if (!with_modes) return out;
-  factor.matrixL().solveInPlace(beyond);  // L^-1 E: its rows are the modes, since cov z = L^-T L^-1
-  for (Index k = 0; k < count; ++k) out.modes.emplace_back(Eigen::Map<SampleMatrix>(beyond.row(k).data(), n_u, curves));
+  WindowEstimate out{.mean = std::move(estimate), .modes = {}, .open_variance = {}};
+  const Eigen::MatrixXf lower_factor = MatrixXd(factor.matrixL()).cast<float>();
+  out.open_variance.resize(static_cast<Index>(spread_rows.size()));
+  for (std::size_t i = 0; i < spread_rows.size(); ++i) {
+    // cov z = L^-T L^-1: with E what the windows do in this row, the rows of L^-1 E are the modes.
+    Eigen::MatrixXf modes = beyond.middleCols(spread_rows[i] * curves, curves).cast<float>();
+    lower_factor.triangularView<Eigen::Lower>().solveInPlace(modes);
+    out.modes.emplace_back(modes.transpose());
+    out.open_variance(static_cast<Index>(i)) = bridge.open(spread_rows[i]);
+  }
   return out;
 }
 

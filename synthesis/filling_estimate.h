@@ -18,15 +18,17 @@ struct WindowPrior {
 };
 
 struct WindowEstimate {
-  SampleMatrix mean;                // [row of the gap][curve]
-  std::vector<SampleMatrix> modes;  // each: one standard deviation along one independent direction, [row][curve]
-  Eigen::VectorXd open_variance;    // [row]: of the process, the same for every curve
+  SampleMatrix mean;                   // [row of the gap][curve]
+  std::vector<Eigen::MatrixXf> modes;  // for each row asked for [curve][mode]: a standard deviation along an
+                                       // independent direction
+  Eigen::VectorXd open_variance;  // for each row asked for: of the process, the same for every curve
 };
 
 // `members`: windows of the library as features, one a row ([row][curve] flattened), nearest first, with their squared
-// distances; `seen`: the window to fill, any values in its gap.
+// distances; `seen`: the window to fill, any values in its gap; `spread_rows`: rows of the gap whose variance is
+// wanted.
 [[nodiscard]] WindowEstimate estimate_window(const FeatureMatrix& members, std::span<const double> distances,
                                              const SampleMatrix& seen, const WindowShape& shape,
-                                             const WindowPrior& prior, bool with_modes);
+                                             const WindowPrior& prior, std::span<const int> spread_rows);
 
 }  // namespace kinespace

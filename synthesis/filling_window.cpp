@@ -37,6 +37,22 @@ Eigen::RowVectorXd unplaced(Eigen::RowVectorXd row, const Eigen::RowVectorXd& we
   return row;
 }
 
+// Standard deviations at every knot from the edge before the gap to the edge after it, both of which are known: between
+// the given rows straight lines.
+Eigen::MatrixXd at_all_knots(const Eigen::MatrixXd& std_cm, const std::vector<int>& rows, int gap) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(gap + 2, std_cm.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto n = static_cast<Index>(i);
+    const int from = i > 0 ? rows[i - 1] : -1;
+    for (int r = from + 1; r <= rows[i]; ++r) {
+      const double t = static_cast<double>(r - from) / (rows[i] - from);
+      out.row(r + 1) = t * std_cm.row(n);
+      if (i > 0) out.row(r + 1) += (1 - t) * std_cm.row(n - 1);
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 double normal_interval(double p) {
@@ -122,12 +138,12 @@ GapFrames FillSetting::fill_gap(std::size_t gap, ClipCurves& curves) const {
   GapFrames out{.windows = 0, .std_cm = Eigen::MatrixXf::Zero(range.count(), library.skeleton().joint_count())};
   Eigen::MatrixXd std_cm = Eigen::MatrixXd::Zero(knots.shape.gap + 2, library.skeleton().joint_count());
   if (knots.shape.gap > 0) {
-    GapEstimate estimate = estimate_gap(library, model_.options(), query, knots.shape, {.extra = own_}, true);
+    GapEstimate estimate = estimate_gap(library, model_.options(), query, knots.shape, {.extra = own_});
     if (estimate.windows < 2) fail_too_long(knots, gap);
     rows.middleRows(knots.shape.before, knots.shape.gap) = estimate.mean;
     out.windows = estimate.windows;
-    std_cm.middleRows(1, knots.shape.gap) =
-        model_.calibration().std_cm(estimate.spread, knots.step_s * (knots.shape.gap + 1));
+    std_cm = at_all_knots(model_.calibration().std_cm(estimate.spread, knots.step_s * (knots.shape.gap + 1)),
+                          estimate.spread.rows, knots.shape.gap);
   }
   const UniformSpline spline(std::move(rows));
   Eigen::RowVectorXd row(library.curves());
