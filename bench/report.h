@@ -51,6 +51,7 @@ struct Bench {
 [[nodiscard]] std::span<const Bench> all_benches();
 
 // Every bench the command knows; each lives in bench/<name>.cpp. Throws Error{bad_input} when its data is missing.
+[[nodiscard]] BenchReport bench_codecs(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_dtw(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_filling(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_feet(const BenchOptions& options);
