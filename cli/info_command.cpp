@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <memory>
@@ -7,6 +8,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "codecs/registry.h"
 #include "fpca/library_view.h"
 #include "motion/read.h"
 
@@ -106,7 +108,43 @@ Json describe_library(const std::filesystem::path& file) {
           {"clip_list", std::move(clips)}};
 }
 
+bool is_stream(const std::filesystem::path& file) {
+  return std::filesystem::is_regular_file(file) && Bitstream::has_magic(MappedFile(file).bytes());
+}
+
+Json describe_stream(const std::filesystem::path& file) {
+  const MappedFile mapped(file);
+  const auto reader = open_stream(mapped.bytes(), file.string());
+  const Bitstream& stream = reader->stream();
+  const Skeleton& skeleton = reader->skeleton(0);
+  std::int64_t frames = 0;
+  double rate = 0;
+  Json clips = Json::array();
+  for (const ClipSummary& clip : reader->clips()) {
+    frames += clip.frames;
+    rate = std::max(rate, clip.rate_hz);
+    clips.push_back({{"name", clip.name}, {"frames", clip.frames}, {"rate_hz", clip.rate_hz}});
+  }
+  return {{"kind", "stream"},
+          {"codec", stream.kind().substr(stream.kind().find(':') + 1)},
+          {"clips", reader->clips().size()},
+          {"frames", frames},
+          {"rate_hz", rate},
+          {"joints", skeleton.joint_count()},
+          {"rotating_joints", skeleton.rotating_joints().size()},
+          {"height_cm", skeleton.rest_height()},
+          {"levels", reader->levels()},
+          {"complete", stream.complete()},
+          {"bytes", mapped.bytes().size()},
+          {"bytes_per_frame", static_cast<double>(mapped.bytes().size()) / static_cast<double>(frames)},
+          {"mean_joint_error_cm", stream.error().mean_joint_error_cm},
+          {"max_joint_error_cm", stream.error().max_joint_error_cm},
+          {"shell_error_cm", stream.error().shell_error_cm},
+          {"clip_list", std::move(clips)}};
+}
+
 constexpr std::array describers{
+    Describer{is_stream, describe_stream},
     Describer{is_library, describe_library},
     Describer{[](const std::filesystem::path&) { return true; }, describe_clip},
 };
@@ -129,7 +167,7 @@ void add_info(CLI::App& app, Session& /*session*/) {
   };
   CLI::App* command = app.add_subcommand("info", "What is in a file");
   const auto options = std::make_shared<Options>();
-  command->add_option("FILE", options->file, "A clip (.bvh, .amc) or a library (.kspace)")->required();
+  command->add_option("FILE", options->file, "A clip (.bvh, .amc), a library (.kspace) or a stream (.ksm)")->required();
   command->add_flag("--json", options->json, "Print it as one JSON object");
   command->callback([options] { run_info(options->file, options->json); });
 }

@@ -21,7 +21,7 @@ constexpr int planned_components = 16;  // that windows are planned by: nearly a
 // The basis is sent in steps of 2^-exponent: fine enough that a component of that energy leaks less than a step into
 // the others, and never so coarse that columns of unit length lose their shape.
 constexpr int coarsest_exponent = 5;
-constexpr int extra_exponent = 4;
+constexpr int extra_exponent = 6;
 constexpr std::size_t windows_at_once = 16;
 constexpr double unlikely = 0.62;  // steps; what is smaller will be coded as zero
 

@@ -135,7 +135,7 @@ Eigen::MatrixXd PoseMetric::combined(double shell_weight) const {
 }
 
 Eigen::MatrixXd PoseMetric::lifted(double shell_weight) const {
-  return lift_diagonal(positions + shell_weight * shell, 0.5);
+  return lift_diagonal(positions + shell_weight * shell, 4);
 }
 
 PoseMetric pose_metric(const Skeleton& skeleton, const ReferencePose& reference, std::span<const double> pose) {

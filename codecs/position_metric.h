@@ -23,7 +23,8 @@ struct PoseMetric {
 
   // With a little of the identity, scaled to each diagonal, so that it has a Cholesky factor.
   [[nodiscard]] Eigen::MatrixXd combined(double shell_weight) const;
-  // With so much of each diagonal added that no direction is all but free: what is free at one pose is not at others.
+  // With four times its diagonal added, so that no direction is all but free: what is free at one pose is not at
+  // others. Still scales every parameter by what it moves, which is all that joint_basis.h wants of it.
   [[nodiscard]] Eigen::MatrixXd lifted(double shell_weight) const;
 };
 

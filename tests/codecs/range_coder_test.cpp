@@ -14,7 +14,7 @@ namespace {
 std::vector<bool> random_bits(int count, double ones, unsigned seed) {
   std::mt19937 generator(seed);
   std::vector<bool> out;
-  for (int i = 0; i < count; ++i) out.push_back(generator() < ones * 4294967296.0);
+  for (int i = 0; i < count; ++i) out.push_back(static_cast<double>(generator()) < ones * 4294967296.0);
   return out;
 }
 

@@ -10,6 +10,8 @@
 namespace kinespace {
 namespace {
 
+using test::data_folder;
+
 std::vector<Clip> read_some(const std::filesystem::path& folder, std::size_t step, std::size_t most) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -28,7 +30,7 @@ double bytes_per_frame(const std::vector<Clip>& clips, const Bytes& stream) {
 }
 
 TEST(RealData, half_a_centimetre_takes_few_bytes_at_30_hz) {
-  KINESPACE_REQUIRE_FOLDER(data, test::data_folder);
+  KINESPACE_REQUIRE_FOLDER(data, data_folder);
   const std::vector<Clip> clips = read_some(data / "bandai2", 24, 40);
   const Bytes stream = encode("motion-space", clips, {.target = {.mean_error_cm = 0.5}});
   const ClipErrorSums error = test::error_of(clips, open_stream(stream, "s")->decode_all());
@@ -38,7 +40,7 @@ TEST(RealData, half_a_centimetre_takes_few_bytes_at_30_hz) {
 }
 
 TEST(RealData, half_a_centimetre_takes_few_bytes_at_120_hz) {
-  KINESPACE_REQUIRE_FOLDER(data, test::data_folder);
+  KINESPACE_REQUIRE_FOLDER(data, data_folder);
   const std::vector<Clip> clips = read_some(data / "cmu" / "02", 1, 4);
   const Bytes stream = encode("motion-space", clips, {.target = {.mean_error_cm = 0.5}});
   const ClipErrorSums error = test::error_of(clips, open_stream(stream, "s")->decode_all());
@@ -48,7 +50,7 @@ TEST(RealData, half_a_centimetre_takes_few_bytes_at_120_hz) {
 }
 
 TEST(RealData, no_joint_of_any_clip_passes_the_largest_error) {
-  KINESPACE_REQUIRE_FOLDER(data, test::data_folder);
+  KINESPACE_REQUIRE_FOLDER(data, data_folder);
   const std::vector<Clip> clips = read_some(data / "bandai2", 97, 10);
   const Bytes stream = encode("motion-space", clips, {.target = {.max_error_cm = 1}});
   EXPECT_LE(test::error_of(clips, open_stream(stream, "s")->decode_all()).largest, 1);

@@ -1,0 +1,161 @@
+// `kinespace bench codecs`: bytes per frame of the motion-space codec at given errors, and how fast it is.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "bench/report.h"
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include "base/error.h"
+#include "codecs/registry.h"
+#include "motion/read.h"
+
+namespace kinespace {
+namespace {
+
+namespace fs = std::filesystem;
+
+// All frames of a set, as the streams they are coded in.
+struct CodecData {
+  std::string name;
+  std::vector<std::vector<Clip>> streams;
+
+  [[nodiscard]] double frames() const {
+    double out = 0;
+    for (const auto& clips : streams) {
+      for (const Clip& clip : clips) out += clip.frames;
+    }
+    return out;
+  }
+};
+
+std::vector<Clip> read_folder(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (is_motion_file(entry.path())) files.push_back(entry.path());
+  }
+  if (files.empty()) {
+    throw Error(ErrorKind::bad_input, {.file = folder.string(),
+                                       .found = "no motion files",
+                                       .expected = "the clips of bandai2 and cmu",
+                                       .remedy = "name the folder that has them by --data"});
+  }
+  std::ranges::sort(files);
+  std::vector<Clip> out;
+  for (const fs::path& file : files) out.push_back(read_clip(file));
+  return out;
+}
+
+struct Bar {
+  double error_cm;
+  double bytes_per_frame;
+};
+
+template <typename Work>
+double seconds(const Work& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Decoding on one core, the fastest of a few rounds: other processes only slow it down.
+double decoding_seconds(const std::vector<Bytes>& streams) {
+  constexpr int rounds = 4;
+  const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+  double best = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < rounds; ++round) {
+    best = std::min(best, seconds([&] {
+                      for (const Bytes& stream : streams) {
+                        static_cast<void>(open_stream(stream, "bench")->decode_all());
+                      }
+                    }));
+  }
+  return best;
+}
+
+void measure(const CodecData& data, const Bar& bar, BenchReport& report) {
+  const double frames = data.frames();
+  std::vector<Bytes> streams;
+  double bytes = 0, mean = 0, shell = 0, largest = 0;
+  const double encoding = seconds([&] {
+    for (const auto& clips : data.streams) {
+      streams.push_back(encode("motion-space", clips, {.target = {.mean_error_cm = bar.error_cm}}));
+    }
+  });
+  for (std::size_t s = 0; s < streams.size(); ++s) {
+    const MeasuredError error = Bitstream::parse(streams[s], "bench").error();
+    double part = 0;
+    for (const Clip& clip : data.streams[s]) part += clip.frames / frames;
+    bytes += static_cast<double>(streams[s].size());
+    mean += part * error.mean_joint_error_cm;
+    shell += part * error.shell_error_cm;
+    largest = std::max(largest, error.max_joint_error_cm);
+  }
+  const auto add = [&](const char* what, double value, const char* unit, std::optional<double> limit, bool higher) {
+    report.results.push_back({.name = fmt::format("motion-space at {} cm: {}", bar.error_cm, what),
+                              .data = data.name,
+                              .value = value,
+                              .unit = unit,
+                              .bar = limit,
+                              .higher_is_better = higher});
+  };
+  add("size", bytes / frames, "bytes/frame", bar.bytes_per_frame, false);
+  add("mean joint error", mean, "cm", bar.error_cm, false);
+  add("shell error over mean joint error", shell / mean, "x", 1.6, false);
+  add("largest joint error", largest, "cm", {}, false);
+  add("encoding, target search included", frames / encoding, "frames/s", 20000, true);
+  // Decoding is dearest for the finest streams, which are for archives; what is played needs no tenth of a millimetre.
+  const std::optional<double> speed = bar.error_cm >= 0.3 ? std::optional(300000.0) : std::nullopt;
+  add("decoding to local rotations, one core", frames / decoding_seconds(streams), "frames/s", speed, true);
+}
+
+// Largest errors, on every clip by itself.
+void measure_largest(const CodecData& data, double target_cm, std::size_t every, BenchReport& report) {
+  double clips = 0, kept = 0;
+  for (const auto& stream : data.streams) {
+    for (std::size_t c = 0; c < stream.size(); c += every) {
+      const Bytes bytes =
+          encode("motion-space", std::span(stream).subspan(c, 1), {.target = {.max_error_cm = target_cm}});
+      ++clips;
+      kept += Bitstream::parse(bytes, "bench").error().max_joint_error_cm <= target_cm ? 1 : 0;
+    }
+  }
+  report.results.push_back(
+      {.name = fmt::format("motion-space: {:.0f} clips that keep to a largest error of {} cm", clips, target_cm),
+       .data = data.name,
+       .value = 100 * kept / clips,
+       .unit = "%",
+       .bar = 100,
+       .higher_is_better = true});
+}
+
+}  // namespace
+
+BenchReport bench_codecs(const BenchOptions& options) {
+  BenchReport report{.bench = "codecs",
+                     .device = "cpu",
+                     .threads = static_cast<int>(std::thread::hardware_concurrency()),
+                     .results = {}};
+  CodecData bandai{.name = "bandai2, one stream", .streams = {}};
+  bandai.streams.push_back(read_folder(options.data / "bandai2"));
+  for (const Bar& bar : {Bar{0.1, 14}, Bar{0.35, 6.5}, Bar{0.5, 4.5}, Bar{1.0, 2.6}, Bar{2.4, 1.2}}) {
+    measure(bandai, bar, report);
+  }
+  measure_largest(bandai, 1, 20, report);
+  CodecData cmu{.name = "cmu 01, 02, 03, a stream each", .streams = {}};
+  for (const char* subject : {"01", "02", "03"}) cmu.streams.push_back(read_folder(options.data / "cmu" / subject));
+  for (const Bar& bar : {Bar{0.1, 14}, Bar{0.35, 7}, Bar{0.5, 3.6}, Bar{0.9, 2.2}, Bar{2.1, 1.15}}) {
+    measure(cmu, bar, report);
+  }
+  measure_largest(cmu, 1, 4, report);
+  return report;
+}
+
+}  // namespace kinespace

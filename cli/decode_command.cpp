@@ -1,0 +1,136 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <set>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "cli/commands.h"
+#include "cli/json_output.h"
+#include "codecs/registry.h"
+#include "motion/read.h"
+
+namespace kinespace::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct DecodeOptions {
+  fs::path stream;
+  fs::path output;
+  std::optional<std::string> clip;
+  std::optional<double> from_s;
+  std::optional<double> to_s;
+  int level = -1;
+  std::string format = ".bvh";
+  bool json = false;
+};
+
+// The frames of a clip from a time to another, both included.
+std::pair<int, int> frame_range(const ClipSummary& clip, const DecodeOptions& options) {
+  const double last = clip.frames - 1;
+  const double from = std::round(options.from_s.value_or(0) * clip.rate_hz);
+  const double to = options.to_s ? std::round(*options.to_s * clip.rate_hz) : last;
+  if (from > to || from > last) {
+    throw Error(ErrorKind::usage,
+                {.found = fmt::format("{} s to {} s", from / clip.rate_hz, to / clip.rate_hz),
+                 .expected = fmt::format("a part of 0 s to {} s of clip {}", last / clip.rate_hz, clip.name)});
+  }
+  const int first = static_cast<int>(from);
+  return {first, static_cast<int>(std::min(to, last)) - first + 1};
+}
+
+std::vector<Clip> decode_clips(const StreamReader& reader, const DecodeOptions& options) {
+  std::vector<std::size_t> wanted;
+  if (options.clip) {
+    wanted.push_back(reader.find(*options.clip));
+  } else if (!options.from_s && !options.to_s) {
+    return reader.decode_all(options.level);
+  }
+  for (std::size_t c = 0; !options.clip && c < reader.clips().size(); ++c) wanted.push_back(c);
+  std::vector<Clip> out;
+  for (const std::size_t c : wanted) {
+    Session::check_stop();
+    const auto [first, count] = frame_range(reader.clips()[c], options);
+    out.push_back(reader.decode(c, first, count, options.level));
+  }
+  return out;
+}
+
+// A clip's name as a file's: what would lead elsewhere or hide the file becomes an underscore.
+std::string file_name(const std::string& clip) {
+  std::string out = clip.empty() ? "clip" : clip;
+  for (char& c : out) {
+    if (c == '/' || c == '\\' || c == '\0') c = '_';
+  }
+  if (out.front() == '.') out.front() = '_';
+  return out;
+}
+
+// OUT is a file for a single clip with an ending that can be written, else a folder.
+std::vector<fs::path> output_files(const std::vector<Clip>& clips, const DecodeOptions& options) {
+  if (!is_motion_file(options.output) && options.output.extension() != ".glb" &&
+      options.output.extension() != ".gltf") {
+    std::vector<fs::path> out;
+    std::set<std::string> taken;
+    for (const Clip& clip : clips) {
+      std::string name = file_name(clip.name);
+      for (int n = 2; !taken.insert(name).second; ++n) name = fmt::format("{} ({})", file_name(clip.name), n);
+      out.push_back(options.output / (name + options.format));
+    }
+    fs::create_directories(options.output);
+    return out;
+  }
+  if (clips.size() != 1) {
+    throw Error(ErrorKind::usage, {.file = options.output.string(),
+                                   .found = fmt::format("one file for {} clips", clips.size()),
+                                   .expected = "a folder, or --clip NAME"});
+  }
+  return {options.output};
+}
+
+void run_decode(const DecodeOptions& options) {
+  const MappedFile file(options.stream);
+  const auto start = std::chrono::steady_clock::now();
+  const auto reader = open_stream(file.bytes(), options.stream.string());
+  const std::vector<Clip> clips = decode_clips(*reader, options);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const std::vector<fs::path> files = output_files(clips, options);
+  double frames = 0;
+  for (std::size_t c = 0; c < clips.size(); ++c) {
+    Session::check_stop();
+    for (const auto& written : files_written(files[c])) require_different_files(options.stream, written);
+    write_clip(files[c], clips[c]);
+    frames += clips[c].frames;
+  }
+  const Json result{{"output", options.output.string()},           {"clips", clips.size()},
+                    {"frames", static_cast<std::int64_t>(frames)}, {"levels", reader->levels()},
+                    {"complete", reader->stream().complete()},     {"decode_frames_per_s", frames / seconds}};
+  options.json ? print_json(result) : print_fields(result);
+}
+
+}  // namespace
+
+void add_decode(CLI::App& app, Session& /*session*/) {
+  CLI::App* command = app.add_subcommand("decode", "Clips out of a stream, all or one or a part of one");
+  const auto options = std::make_shared<DecodeOptions>();
+  command->add_option("IN", options->stream, "The stream (.ksm), whole or its beginning")->required();
+  command->add_option("-o,--output", options->output, "A folder, or for one clip a .bvh, .amc, .glb or .gltf file")
+      ->required();
+  command->add_option("--clip", options->clip, "Only the clip of that name");
+  command->add_option("--from", options->from_s, "From this time on, in seconds")->check(CLI::NonNegativeNumber);
+  command->add_option("--to", options->to_s, "Up to this time, in seconds")->check(CLI::NonNegativeNumber);
+  command->add_option("--level", options->level, "Only so many levels of detail")->check(CLI::NonNegativeNumber);
+  command->add_option("--format", options->format, "Ending of the files in a folder")
+      ->check(CLI::IsMember({".bvh", ".amc", ".glb", ".gltf"}));
+  command->add_flag("--json", options->json, "Print what was decoded as one JSON object");
+  command->callback([options] { run_decode(*options); });
+}
+
+}  // namespace kinespace::cli

@@ -1,0 +1,159 @@
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "cli/commands.h"
+#include "cli/json_output.h"
+#include "codecs/registry.h"
+#include "motion/read.h"
+
+namespace kinespace::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct EncodeOptions {
+  std::vector<fs::path> inputs;
+  fs::path output;
+  std::string codec = "motion-space";
+  CodecTarget target;
+  std::vector<std::string> settings;  // NAME=VALUE
+  bool json = false;
+};
+
+// Files as they are named, and of folders all motion files in them, by name.
+std::vector<fs::path> input_files(const std::vector<fs::path>& inputs) {
+  std::vector<fs::path> out;
+  for (const fs::path& input : inputs) {
+    if (!fs::is_directory(input)) {
+      out.push_back(input);
+      continue;
+    }
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(input)) {
+      if (entry.is_regular_file() && is_motion_file(entry.path())) files.push_back(entry.path());
+    }
+    if (files.empty()) {
+      throw Error(ErrorKind::bad_input,
+                  {.file = input.string(), .found = "no motion files", .expected = "a folder of .bvh or .amc files"});
+    }
+    std::ranges::sort(files);
+    out.insert(out.end(), files.begin(), files.end());
+  }
+  return out;
+}
+
+std::vector<Clip> read_clips(const std::vector<fs::path>& files, const fs::path& output, Progress progress) {
+  std::vector<Clip> out;
+  std::map<std::string, int> names;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    progress.at("reading", static_cast<double>(i) / static_cast<double>(files.size()));
+    Session::check_stop();
+    for (const auto& file : files_read(files[i])) require_different_files(file, output);
+    out.push_back(read_clip(files[i]));
+    // Two clips of one name could not be told apart when decoding.
+    const int seen = ++names[out.back().name];
+    if (seen > 1) out.back().name += fmt::format(" ({})", seen);
+  }
+  return out;
+}
+
+std::map<std::string, double, std::less<>> parse_settings(const std::vector<std::string>& settings) {
+  std::map<std::string, double, std::less<>> out;
+  for (const std::string& setting : settings) {
+    const std::size_t equals = setting.find('=');
+    const char* const last = setting.data() + setting.size();
+    double value = 0;
+    const auto read = equals == std::string::npos ? std::from_chars_result{last, std::errc::invalid_argument}
+                                                  : std::from_chars(setting.data() + equals + 1, last, value);
+    if (read.ec != std::errc() || read.ptr != last) {
+      throw Error(ErrorKind::usage, {.found = "--set " + setting, .expected = "NAME=NUMBER, as in --set step=2"});
+    }
+    out[setting.substr(0, equals)] = value;
+  }
+  return out;
+}
+
+// 32-bit floats of three numbers for the root and three for each rotating joint, in all frames.
+double raw_bytes(const std::vector<Clip>& clips) {
+  double out = 0;
+  for (const Clip& clip : clips) {
+    out += 4.0 * clip.frames * (3.0 + 3.0 * static_cast<double>(clip.skeleton.rotating_joints().size()));
+  }
+  return out;
+}
+
+void run_encode(const EncodeOptions& options, Session& session) {
+  const Progress progress = session.progress();
+  const std::vector<Clip> clips = read_clips(input_files(options.inputs), options.output, progress);
+  const CodecOptions codec_options{
+      .target = options.target, .settings = parse_settings(options.settings), .progress = progress};
+  const auto start = std::chrono::steady_clock::now();
+  const Bytes stream = encode(options.codec, clips, codec_options);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  session.finish_progress();
+  write_file_atomically(options.output, stream);
+
+  double frames = 0;
+  for (const Clip& clip : clips) frames += clip.frames;
+  const MeasuredError error = Bitstream::parse(stream, options.output.string()).error();
+  const auto bytes = static_cast<double>(stream.size());
+  const Json result{{"codec", options.codec},
+                    {"output", options.output.string()},
+                    {"clips", clips.size()},
+                    {"frames", static_cast<std::int64_t>(frames)},
+                    {"bytes", stream.size()},
+                    {"bytes_per_frame", bytes / frames},
+                    {"ratio", raw_bytes(clips) / bytes},
+                    {"mean_joint_error_cm", error.mean_joint_error_cm},
+                    {"max_joint_error_cm", error.max_joint_error_cm},
+                    {"shell_error_cm", error.shell_error_cm},
+                    {"encode_frames_per_s", frames / seconds}};
+  options.json ? print_json(result) : print_fields(result);
+}
+
+std::string settings_help() {
+  std::string out = "A setting of the codec, NAME=NUMBER.";
+  for (const Codec* codec : all_codecs()) {
+    for (const CodecSetting& setting : codec->settings()) {
+      out += fmt::format("\n{}: {} ({}; {} to {})", codec->name(), setting.name, setting.meaning, setting.least,
+                         setting.most);
+    }
+  }
+  return out;
+}
+
+std::vector<std::string> codec_names() {
+  std::vector<std::string> out;
+  for (const Codec* codec : all_codecs()) out.emplace_back(codec->name());
+  return out;
+}
+
+}  // namespace
+
+void add_encode(CLI::App& app, Session& session) {
+  CLI::App* command = app.add_subcommand("encode", "Compress clips of one skeleton into a stream");
+  const auto options = std::make_shared<EncodeOptions>();
+  command->add_option("IN", options->inputs, "Clips (.bvh, .amc) or folders of them")->required();
+  command->add_option("-o,--output", options->output, "The stream to write (.ksm)")->required();
+  command->add_option("--codec", options->codec, "How")->check(CLI::IsMember(codec_names()));
+  CLI::Option_group* target = command->add_option_group("target", "At most one");
+  target->add_option("--error", options->target.mean_error_cm, "Mean joint error to keep to, in cm");
+  target->add_option("--max-error", options->target.max_error_cm, "Largest joint error of any frame, in cm");
+  target->add_option("--bytes", options->target.bytes, "Size to keep to");
+  target->require_option(0, 1);
+  command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
+  command->add_flag("--json", options->json, "Print what was written as one JSON object");
+  command->callback([options, &session] { run_encode(*options, session); });
+}
+
+}  // namespace kinespace::cli
