@@ -79,6 +79,23 @@ TEST_F(LibraryCommands, query_takes_a_file_and_a_name_with_quotes_and_colons) {
   EXPECT_EQ(run_command({"query", library().string(), "it's a \"walk\": 1"}).code, 0);
 }
 
+TEST_F(LibraryCommands, query_finds_stretches_inside_clips) {
+  const CommandResult result = run_command({"query", library().string(), "walk_normal_001", "--windows", "--from",
+                                            "0.2", "--to", "0.9", "-k", "3", "--json"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  const json answer = json::parse(result.out);
+  ASSERT_EQ(answer["matches"].size(), 3U);
+  EXPECT_EQ(answer["matches"][0]["clip"], "it's a \"walk\": 1");
+  EXPECT_NEAR(answer["matches"][0]["start_s"].get<double>(), 0.2, 1e-6);
+  EXPECT_NEAR(answer["matches"][0]["end_s"].get<double>(), 0.9, 1e-6);
+  const auto fails = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"query", library().string(), "walk_normal_001"});
+    return run_command(arguments).code;
+  };
+  EXPECT_EQ(fails({"--windows", "--from", "1000"}), 2);
+  EXPECT_EQ(fails({"--from", "0.2"}), 2);
+}
+
 TEST_F(LibraryCommands, export_plays_at_a_level_of_detail) {
   double before = 1e9;
   for (const char* lod : {"2", "5", "100"}) {
