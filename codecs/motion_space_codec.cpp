@@ -168,7 +168,7 @@ class Search {
   // Makes the windows finer that are off by more; empty when some cannot be.
   Bytes refine(double step, double target) {
     std::vector<int> finer(encoder_.window_count(), 0);
-    constexpr int most_rounds = 24;
+    constexpr int most_rounds = 40;
     for (int round = 0; round < most_rounds; ++round) {
       const Attempt attempt = encoder_.attempt(step, settings_, &*last_, finer);
       bool met = true;

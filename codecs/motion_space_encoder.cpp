@@ -194,7 +194,8 @@ void MotionSpaceEncoder::cut(std::size_t c, double step, const MotionSpaceSettin
 }
 
 // What coding a component takes off the squared error, in squared steps, less what its bits are worth.
-double MotionSpaceEncoder::gain_of(int component, double step, std::span<const std::size_t> windows) const {
+double MotionSpaceEncoder::gain_of(int component, double step, const WindowLayout& layout,
+                                   std::span<const std::size_t> windows) const {
   constexpr double bits_of_value = 7;
   constexpr double bits_of_entry = 3;
   constexpr double worth = 0.12;
@@ -203,21 +204,22 @@ double MotionSpaceEncoder::gain_of(int component, double step, std::span<const s
                 static_cast<double>(window_count());
   for (const std::size_t w : windows) {
     const std::vector<double>& window = coefficients_[w];
-    const std::size_t points = window.size() / static_cast<std::size_t>(reference_.dimensions());
+    const auto points = static_cast<std::size_t>(layout.windows[w].points);
+    const double scale = finer_factor(layout.windows[w].finer) / step;
     for (std::size_t k = 0; k < points; ++k) {
-      const double size = std::abs(window[static_cast<std::size_t>(component) * points + k]) / step;
+      const double size = std::abs(window[static_cast<std::size_t>(component) * points + k]) * scale;
       if (size > unlikely) gain += size * size - 1.0 / 12 - worth * bits_of_value;
     }
   }
   return gain;
 }
 
-void MotionSpaceEncoder::choose_basis(std::span<const std::size_t> windows, MotionSpaceTables& tables,
-                                      Eigen::MatrixXd& mixing) const {
+void MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows,
+                                      MotionSpaceTables& tables, Eigen::MatrixXd& mixing) const {
   const double step = tables.step;
   const int d = reference_.dimensions();
   std::vector<double> gains(static_cast<std::size_t>(d));
-  tbb::parallel_for(0, d, [&](int c) { gains[static_cast<std::size_t>(c)] = gain_of(c, step, windows); });
+  tbb::parallel_for(0, d, [&](int c) { gains[static_cast<std::size_t>(c)] = gain_of(c, step, layout, windows); });
   std::vector<int> kept;
   for (int c = 0; c < d; ++c) {
     if (gains[static_cast<std::size_t>(c)] > 0) kept.push_back(c);
@@ -353,18 +355,18 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
   a.tables.shell_weight = settings.shell_weight;
   a.tables.group_frames = settings.group_frames;
   a.tables.reference = reference_;
+  for (std::size_t c = 0; c < clips_.size() && !finer.empty(); ++c) {
+    for (std::size_t b = 0; b < a.clips.clips[c].blocks.size(); ++b)
+      a.clips.clips[c].finer[b] = finer[first_window_[c] + b];
+  }
   Eigen::MatrixXd mixing;
   a.layout = lay_out(a.clips, {}, settings.group_frames);
   std::vector<std::size_t> windows;  // that are coded
   for (std::size_t g = 0; g < a.layout.groups.size(); g += static_cast<std::size_t>(settings.sample)) {
     for (std::size_t i = 0; i < a.layout.groups[g].count; ++i) windows.push_back(a.layout.groups[g].first + i);
   }
-  choose_basis(windows, a.tables, mixing);
+  choose_basis(a.layout, windows, a.tables, mixing);
   const int components = a.tables.basis.components;
-  for (std::size_t c = 0; c < clips_.size() && !finer.empty(); ++c) {
-    for (std::size_t b = 0; b < a.clips.clips[c].blocks.size(); ++b)
-      a.clips.clips[c].finer[b] = finer[first_window_[c] + b];
-  }
 
   // Scaled coefficients, and what the spectrum of their plain rounding is.
   coding.wanted.resize(coefficients_.size());

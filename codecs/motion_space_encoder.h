@@ -53,8 +53,10 @@ class MotionSpaceEncoder {
   void cut(std::size_t clip, double step, const MotionSpaceSettings& settings);
   void weigh(double shell_weight);
   void transform();
-  void choose_basis(std::span<const std::size_t> windows, MotionSpaceTables& tables, Eigen::MatrixXd& mixing) const;
-  [[nodiscard]] double gain_of(int component, double step, std::span<const std::size_t> windows) const;
+  void choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows, MotionSpaceTables& tables,
+                    Eigen::MatrixXd& mixing) const;
+  [[nodiscard]] double gain_of(int component, double step, const WindowLayout& layout,
+                               std::span<const std::size_t> windows) const;
   void scale(std::size_t w, const WindowPlace& window, const Eigen::MatrixXd& mixing,
              std::vector<double>& wanted) const;
   void code_groups(Coding& coding, const MotionSpaceSettings& settings, bool measure) const;
