@@ -1,6 +1,6 @@
 // Eigenvalues of a symmetric matrix, all of them, and the eigenvectors of the largest.
 //
-// In two steps, because how many vectors are wanted is known only once the values are. Private to this folder.
+// In two steps, because how many vectors are wanted is known only once the values are. For this folder and synthesis.
 #pragma once
 
 #include <vector>

@@ -8,8 +8,9 @@
 // Only breaks of the recording, where decode() jumps too, are jumps: a time between the two frames beside a break gets
 // the nearer one.
 //
-// A pose costs 0.1 to 0.3 microseconds for 31 joints at 5 functions, and nothing is allocated. Poses may be asked for
-// from several threads. Memory: coefficients as floats, and for each cut, level and curve two more.
+// A pose of 30 joints at 5 functions takes 0.15 microseconds, 0.5 when its memory is cold, and nothing is allocated.
+// Poses may be asked for from several threads. Memory: coefficients as floats, and for each cut, level and curve two
+// more.
 //
 // What is not played: side tracks (translations of joints below the root; the joints above the travel root are folded
 // into the root's place and orientation). decode() has them.

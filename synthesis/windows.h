@@ -37,7 +37,7 @@ struct TimeRange {
   std::optional<double> to_s = std::nullopt;  // none: from_s plus the length of a window
 };
 
-// The windows of all clips of one joint tree, ready to be searched. For a library of 160 000 frames it takes about two
+// The windows of all clips of one joint tree, ready to be searched. For a library of 160 000 frames it takes a few
 // seconds to make and 1 kB a window to keep; a query takes well below a millisecond.
 class WindowIndex {
  public:
