@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <compare>
 #include <limits>
 #include <map>
 #include <numeric>
@@ -14,94 +13,17 @@
 #include <tbb/parallel_for.h>
 
 #include "base/error.h"
+#include "fpca/alignment.h"
 #include "synthesis/graph_bridges.h"
+#include "synthesis/graph_ways.h"
 #include "synthesis/interpolation.h"
 
 namespace kinespace {
 namespace {
 
 constexpr const char* artifact_kind = "motion graph";
-constexpr double arrow_cost_cm = 1;
 constexpr double second_cost_cm = 0.5;
 constexpr std::size_t block = 32;  // clips that are taken in between two looks at the progress
-
-struct GraphMotion {
-  std::int64_t id = 0;
-  bool fresh = false;  // not in the graph yet
-  ConnectionMotion start, end;
-};
-
-struct Way {
-  double cost_cm = 0;
-  std::size_t other = 0;
-  auto operator<=>(const Way&) const = default;
-};
-
-// The best ways out of every motion (or into it), and what was found out on the way.
-class BestWays {
- public:
-  BestWays(const ConnectionSpace& space, const ConnectionBounds& bounds, const std::vector<GraphMotion>& motions,
-           const MotionGraphOptions& options, bool out)
-      : space_(space), bounds_(bounds), motions_(motions), options_(options), out_(out), best_(motions.size()), tried_(motions.size()) {}
-
-  void know(std::size_t motion, Way way) { best_[motion].push_back(way); }
-  // Costs that another search found out: not computed again.
-  void use(const BestWays& other) { other_ = &other; }
-
-  void search(std::size_t motion) {
-    std::vector<Way>& best = best_[motion];
-    std::ranges::sort(best);
-    const auto keep = [&] {
-      if (best.size() > static_cast<std::size_t>(options_.connections)) best.resize(static_cast<std::size_t>(options_.connections));
-    };
-    keep();
-    std::vector<Way> bounds;
-    for (std::size_t other = 0; other < motions_.size(); ++other) {
-      if (other == motion || !(motions_[motion].fresh || motions_[other].fresh)) continue;
-      bounds.push_back({out_ ? bounds_.cm(motion, other) : bounds_.cm(other, motion), other});
-    }
-    std::ranges::sort(bounds);
-    for (const Way& bound : bounds) {
-      const bool full = best.size() == static_cast<std::size_t>(options_.connections);
-      if (bound.cost_cm > options_.largest_cost_cm || (full && bound.cost_cm > best.back().cost_cm)) break;
-      const double give_up = full ? std::min(best.back().cost_cm, options_.largest_cost_cm) : options_.largest_cost_cm;
-      const double cost = cost_of(motion, bound.other, give_up);
-      tried_[motion][bound.other] = cost;
-      if (cost > options_.largest_cost_cm) continue;
-      const Way way{cost, bound.other};
-      best.insert(std::ranges::lower_bound(best, way), way);
-      keep();
-    }
-  }
-
-  [[nodiscard]] const std::vector<Way>& of(std::size_t motion) const { return best_[motion]; }
-
- private:
-  [[nodiscard]] const GraphMotion& leaving(std::size_t motion, std::size_t other) const {
-    return motions_[out_ ? motion : other];
-  }
-  [[nodiscard]] const GraphMotion& entered(std::size_t motion, std::size_t other) const {
-    return motions_[out_ ? other : motion];
-  }
-  [[nodiscard]] double cost_of(std::size_t motion, std::size_t other, double give_up_cm) const {
-    if (other_) {
-      const auto known = other_->tried_[other].find(motion);
-      if (known != other_->tried_[other].end() && std::isfinite(known->second)) return known->second;
-    }
-    const auto connection =
-        space_.connect(leaving(motion, other).end, entered(motion, other).start, 0, give_up_cm);
-    return connection ? connection->cost_cm : std::numeric_limits<double>::infinity();
-  }
-
-  const ConnectionSpace& space_;
-  const ConnectionBounds& bounds_;
-  const std::vector<GraphMotion>& motions_;
-  const MotionGraphOptions& options_;
-  bool out_;
-  std::vector<std::vector<Way>> best_;
-  std::vector<std::map<std::size_t, double>> tried_;
-  const BestWays* other_ = nullptr;
-};
 
 // Runs in parallel over all motions, in blocks, and tells how far it is.
 template <typename Work>
@@ -135,6 +57,43 @@ std::vector<std::vector<std::size_t>> nearest_rows(const RetrievalMatrix& matrix
   return out;
 }
 
+// For each clip of the graph its group of similar clips: that of the nearest of the templates.
+std::vector<std::size_t> nearest_templates(const RetrievalMatrix& matrix, std::span<const std::int64_t> clips,
+                                           std::span<const std::int64_t> templates) {
+  const auto row_of = [&](std::int64_t id) {
+    const auto row = std::ranges::lower_bound(matrix.clip_ids, id) - matrix.clip_ids.begin();
+    return Eigen::Map<const Eigen::VectorXf>(matrix.values.data() + row * static_cast<std::ptrdiff_t>(matrix.dimensions),
+                                             static_cast<Eigen::Index>(matrix.dimensions));
+  };
+  std::vector<std::size_t> out;
+  for (const std::int64_t clip : clips) {
+    std::size_t best = 0;
+    float least = std::numeric_limits<float>::infinity();
+    for (std::size_t t = 0; t < templates.size(); ++t) {
+      const float distance = (row_of(clip) - row_of(templates[t])).squaredNorm();
+      if (distance < least) {
+        least = distance;
+        best = t;
+      }
+    }
+    out.push_back(best);
+  }
+  return out;
+}
+
+// Clips spread over all clips: farthest first.
+std::vector<std::int64_t> spread_templates(const RetrievalMatrix& matrix, std::span<const std::int64_t> clips, int count) {
+  Eigen::MatrixXf vectors(static_cast<Eigen::Index>(clips.size()), static_cast<Eigen::Index>(matrix.dimensions));
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    const auto row = std::ranges::lower_bound(matrix.clip_ids, clips[i]) - matrix.clip_ids.begin();
+    vectors.row(static_cast<Eigen::Index>(i)) = Eigen::Map<const Eigen::RowVectorXf>(
+        matrix.values.data() + row * static_cast<std::ptrdiff_t>(matrix.dimensions), vectors.cols());
+  }
+  std::vector<std::int64_t> out;
+  for (const int t : group_sequences(vectors, count).templates) out.push_back(clips[static_cast<std::size_t>(t)]);
+  return out;
+}
+
 bool before(const GraphArrow& a, const GraphArrow& b) {
   return std::tuple(a.from, a.to, a.kind) < std::tuple(b.from, b.to, b.kind);
 }
@@ -146,6 +105,7 @@ void MotionGraphOptions::validate() const {
     throw Error(ErrorKind::usage, {.found = found, .expected = expected});
   };
   if (connections < 1 || connections > 1000) fail(fmt::format("connections = {}", connections), "from 1 to 1000");
+  if (groups < 1 || groups > 1000) fail(fmt::format("groups = {}", groups), "from 1 to 1000");
   if (neighbours < 0 || neighbours > 1000) fail(fmt::format("neighbours = {}", neighbours), "from 0 to 1000");
   if (!(largest_cost_cm > 0)) fail(fmt::format("largest_cost_cm = {}", largest_cost_cm), "above 0");
   connection.validate();
@@ -173,7 +133,7 @@ MotionGraph MotionGraph::of(LibraryView& library, std::int64_t space_id, const M
   MotionGraph graph = unpack(*kept, library.library().path().string());
   graph.key_ = key;
   const MotionGraphOptions& had = graph.options_;
-  const bool same = had.connections == options.connections && had.neighbours == options.neighbours &&
+  const bool same = had.connections == options.connections && had.groups == options.groups && had.neighbours == options.neighbours &&
                     had.largest_cost_cm == options.largest_cost_cm &&
                     had.connection.window_s == options.connection.window_s &&
                     had.connection.shortest_s == options.connection.shortest_s &&
@@ -206,7 +166,7 @@ void MotionGraph::take_in(LibraryView& library, std::int64_t space_id, const Pro
   }
   if (!any) return;
 
-  std::vector<GraphMotion> motions;
+  GraphMotions motions;
   std::map<std::int64_t, std::size_t> index;
   clips_.clear();
   durations_s_.clear();
@@ -215,31 +175,33 @@ void MotionGraph::take_in(LibraryView& library, std::int64_t space_id, const Pro
     progress.at("reading motions", static_cast<double>(motions.size()) / static_cast<double>(rows.size()));
     const ClipCurves curves = library.curves(row);
     index[row.id] = motions.size();
-    motions.push_back({row.id, !had.contains(row.id), space.start_of(curves), space.end_of(curves)});
+    motions.starts.push_back(space.start_of(curves));
+    motions.ends.push_back(space.end_of(curves));
+    motions.fresh.push_back(!had.contains(row.id));
     clips_.push_back(row.id);
     durations_s_.push_back(static_cast<double>(row.frames - 1) / row.rate_hz);
   }
+  const RetrievalMatrix matrix = library.library().retrieval_matrix(space_id);
+  if (templates_.empty()) templates_ = spread_templates(matrix, clips_, options_.groups);
+  motions.group = nearest_templates(matrix, clips_, templates_);
 
   std::vector<const ConnectionMotion*> ends, starts;
-  for (const GraphMotion& motion : motions) {
-    ends.push_back(&motion.end);
-    starts.push_back(&motion.start);
-  }
-  const ConnectionBounds limits(options_.connection, ends, starts);
-  BestWays out(space, limits, motions, options_, true), in(space, limits, motions, options_, false);
+  for (const ConnectionMotion& motion : motions.ends) ends.push_back(&motion);
+  for (const ConnectionMotion& motion : motions.starts) starts.push_back(&motion);
+  const ConnectionBounds bounds(options_.connection, ends, starts);
+  std::vector<std::vector<GraphWay>> ways(motions.size());
   for (const GraphArrow& arrow : arrows_) {
-    if (arrow.kind != GraphArrow::Kind::connection) continue;
-    out.know(index.at(arrow.from), {arrow.cost_cm, index.at(arrow.to)});
-    in.know(index.at(arrow.to), {arrow.cost_cm, index.at(arrow.from)});
+    if (arrow.kind == GraphArrow::Kind::connection) {
+      ways[index.at(arrow.from)].push_back({arrow.cost_cm, index.at(arrow.to)});
+    }
   }
-  over_all(motions.size(), "connecting motions", progress, [&](std::size_t i) { out.search(i); });
-  in.use(out);
-  over_all(motions.size(), "connecting motions (into)", progress, [&](std::size_t i) { in.search(i); });
-
+  const GraphWayLimits limits{static_cast<std::size_t>(options_.connections), options_.largest_cost_cm};
+  over_all(motions.size(), "connecting motions", progress, [&](std::size_t i) {
+    ways[i] = best_ways(space, bounds, motions, i, std::move(ways[i]), limits);
+  });
   std::map<std::pair<std::int64_t, std::int64_t>, double> connections;
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    for (const Way& way : out.of(i)) connections[{motions[i].id, motions[way.other].id}] = way.cost_cm;
-    for (const Way& way : in.of(i)) connections[{motions[way.other].id, motions[i].id}] = way.cost_cm;
+    for (const GraphWay& way : ways[i]) connections[{clips_[i], clips_[way.to]}] = way.cost_cm;
   }
 
   // Neighbours: which they are is cheap to find; how far apart they are is kept from before where it is known.
@@ -247,7 +209,6 @@ void MotionGraph::take_in(LibraryView& library, std::int64_t space_id, const Pro
   for (const GraphArrow& arrow : arrows_) {
     if (arrow.kind == GraphArrow::Kind::neighbour) known[{arrow.from, arrow.to}] = arrow.cost_cm;
   }
-  const RetrievalMatrix matrix = library.library().retrieval_matrix(space_id);
   const auto nearest = nearest_rows(matrix, options_.neighbours);
   std::set<std::pair<std::int64_t, std::int64_t>> pairs;
   for (std::size_t i = 0; i < nearest.size(); ++i) {
@@ -307,7 +268,7 @@ std::optional<GraphPath> MotionGraph::path(std::int64_t from, std::int64_t to) c
     const double playing = clip == from ? 0 : second_cost_cm * durations_s_[here];
     for (auto arrow = std::ranges::lower_bound(arrows_, clip, {}, &GraphArrow::from);
          arrow != arrows_.end() && arrow->from == clip; ++arrow) {
-      const double next = so_far + playing + arrow->cost_cm + arrow_cost_cm;
+      const double next = so_far + playing + weight_of(arrow->cost_cm);
       const auto there = static_cast<std::size_t>(place(arrow->to));
       if (next >= cost[there]) continue;
       cost[there] = next;
@@ -316,7 +277,7 @@ std::optional<GraphPath> MotionGraph::path(std::int64_t from, std::int64_t to) c
     }
   }
   if (cost[static_cast<std::size_t>(place(to))] == infinite) return std::nullopt;
-  GraphPath out{.clips = {to}};
+  GraphPath out{.clips = {to}, .weight = cost[static_cast<std::size_t>(place(to))]};
   while (out.clips.back() != from) {
     const GraphArrow* arrow = by[static_cast<std::size_t>(place(out.clips.back()))];
     out.kinds.push_back(arrow->kind);

@@ -3,12 +3,12 @@
 //
 // An arrow from one clip to another is either a connection (connection.h: the end of one goes over into the start of
 // the other) or leads to a neighbour (one of the nearest clips in the space, into which the motion is blended while it
-// plays, interpolation.h). Kept for each clip are the `connections` best ways out of it and into it and its nearest
-// neighbours, with at most `largest_cost_cm`. Which connections are best is exact: pairs are tried by their lower
-// bounds (ConnectionBounds) until no other can be better. The best connections alone stay among motions of a kind, so
-// groups of clips that cannot leave or cannot be reached are joined by bridges: the best of the 16 connections between
-// the poses nearest on the average, out of the group and into it, until all are joined or nothing below the largest
-// cost is left.
+// plays, interpolation.h). Kept for each clip are the `connections` best ways out of it, the best way into each of
+// `groups` groups of similar clips (so that far motions are few steps away), and its nearest neighbours, with at most
+// `largest_cost_cm`. Which connections are the best is exact: pairs are tried by their lower bounds (ConnectionBounds)
+// until no other can be better; into a group it is the best of the 4 of lowest bound. Groups of clips that still cannot be left or reached are joined by bridges: the best of
+// the 16 connections between the poses nearest on the average, until all are joined or nothing below the largest cost
+// is left.
 //
 // The graph is kept in the library file. Clips that were added since are taken in, with the functions that the graph
 // was made with, so that old arrows keep their costs.
@@ -27,7 +27,8 @@
 namespace kinespace {
 
 struct MotionGraphOptions {
-  int connections = 4;          // 1 .. 1000, in either direction
+  int connections = 4;          // 1 .. 1000
+  int groups = 12;              // 1 .. 1000
   int neighbours = 4;           // 0 .. 1000
   double largest_cost_cm = 30;  // > 0
   ConnectionOptions connection;
@@ -49,6 +50,7 @@ struct GraphPath {
   std::vector<std::int64_t> clips;
   std::vector<GraphArrow::Kind> kinds;
   double cost_cm = 0;  // sum of the arrows
+  double weight = 0;   // what was minimised
 };
 
 class MotionGraph {
@@ -63,8 +65,9 @@ class MotionGraph {
   // Keeps the graph in the library.
   void save(Library& library) const;
 
-  // The cheapest path between two clips: the sum of the arrows' costs, 1 cm for every arrow and 0.5 cm for every second
-  // that a clip in between plays. None when there is no way: an answer, not an error.
+  // The lightest path between two clips. An arrow of cost c weighs c^2 / 5 cm + 1 cm, so that a far step gives way to
+  // several near ones, and a clip in between 0.5 cm for every second that it plays. None when there is no way: an
+  // answer, not an error.
   [[nodiscard]] std::optional<GraphPath> path(std::int64_t from, std::int64_t to) const;
 
   [[nodiscard]] const std::vector<GraphArrow>& arrows() const { return arrows_; }  // by from, to, kind
@@ -75,6 +78,9 @@ class MotionGraph {
   [[nodiscard]] Bytes pack() const;
   [[nodiscard]] static MotionGraph unpack(std::span<const std::byte> bytes, const std::string& source);
 
+  // What an arrow of that cost weighs.
+  [[nodiscard]] static double weight_of(double cost_cm) { return cost_cm * cost_cm / 5 + 1; }
+
  private:
   MotionGraph() = default;
   void take_in(LibraryView& library, std::int64_t space_id, const Progress& progress);
@@ -83,6 +89,7 @@ class MotionGraph {
   std::string key_;         // of the library's artifact
   SampleMatrix functions_;  // of the connections
   std::vector<std::int64_t> clips_;
+  std::vector<std::int64_t> templates_;  // one clip a group
   std::vector<double> durations_s_;
   std::vector<GraphArrow> arrows_;
 };

@@ -16,6 +16,7 @@ Bytes MotionGraph::pack() const {
   ByteWriter out;
   out.put(graph_version);
   out.put(static_cast<std::int32_t>(options_.connections));
+  out.put(static_cast<std::int32_t>(options_.groups));
   out.put(static_cast<std::int32_t>(options_.neighbours));
   out.put(options_.largest_cost_cm);
   out.put(options_.connection.window_s);
@@ -27,6 +28,8 @@ Bytes MotionGraph::pack() const {
   out.put(static_cast<std::uint64_t>(clips_.size()));
   out.put_array(std::span(clips_));
   out.put_array(std::span(durations_s_));
+  out.put(static_cast<std::uint64_t>(templates_.size()));
+  out.put_array(std::span(templates_));
   out.put(static_cast<std::uint64_t>(arrows_.size()));
   for (const GraphArrow& arrow : arrows_) {
     out.put(arrow.from);
@@ -45,6 +48,7 @@ MotionGraph MotionGraph::unpack(std::span<const std::byte> bytes, const std::str
   }
   MotionGraph graph;
   graph.options_.connections = in.get<std::int32_t>();
+  graph.options_.groups = in.get<std::int32_t>();
   graph.options_.neighbours = in.get<std::int32_t>();
   graph.options_.largest_cost_cm = in.get<double>();
   graph.options_.connection.window_s = in.get<double>();
@@ -60,6 +64,12 @@ MotionGraph MotionGraph::unpack(std::span<const std::byte> bytes, const std::str
   const auto clips = in.get<std::uint64_t>();
   graph.clips_ = in.get_array<std::int64_t>(clips);
   graph.durations_s_ = in.get_array<double>(clips);
+  graph.templates_ = in.get_array<std::int64_t>(in.get<std::uint64_t>());
+  const bool templates_known = std::ranges::all_of(
+      graph.templates_, [&](std::int64_t id) { return std::ranges::binary_search(graph.clips_, id); });
+  if (!templates_known || (graph.templates_.empty() && clips > 0)) {
+    in.fail("a motion graph whose groups have no clips", "a whole motion graph");
+  }
   const auto arrows = in.get<std::uint64_t>();
   for (std::uint64_t i = 0; i < arrows; ++i) {
     GraphArrow arrow{.from = in.get<std::int64_t>(), .to = in.get<std::int64_t>()};

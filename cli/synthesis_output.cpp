@@ -1,0 +1,45 @@
+#include "cli/synthesis_output.h"
+
+#include "base/file.h"
+#include "cli/session.h"
+#include "footskate/cleanup.h"
+#include "motion/read.h"
+
+namespace kinespace::cli {
+
+void require_no_overwriting(const SynthesisOutput& output, const std::filesystem::path& library) {
+  for (const auto& file : files_written(output.file)) require_different_files(library, file);
+  if (output.picture) require_different_files(library, *output.picture);
+}
+
+void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result) {
+  StripOptions strip{.title = clip.name, .bands = bands};
+  Json feet;
+  if (output.clean_feet) {
+    const CleanResult cleaned = clean(clip);
+    const CleanReport& report = cleaned.report;
+    const auto joints = report.feet.foot_joints();
+    for (const Plant& plant : report.plants) {
+      strip.marks.push_back({.joint = joints[plant.contact.slot],
+                             .first_frame = plant.contact.first_frame,
+                             .last_frame = plant.contact.last_frame,
+                             .position_cm = plant.place});
+    }
+    strip.floor_cm = report.ground.height_cm;
+    feet = {{"plants", report.plants.size()},
+            {"foot_slide_before_cm_s", report.foot_slide_before_cm_s},
+            {"foot_slide_after_cm_s", report.foot_slide_after_cm_s},
+            {"floor_penetration_cm", report.floor_penetration_cm}};
+    clip = cleaned.clip;
+  }
+  Session::check_stop();
+  write_clip(output.file, clip);
+  if (output.picture) write_strip(*output.picture, clip, strip);
+  result["output"] = output.file.string();
+  result["frames"] = clip.frames;
+  result["rate_hz"] = clip.rate_hz;
+  result["duration_s"] = clip.duration_s();
+  result.update(feet.is_null() ? Json::object() : feet);
+}
+
+}  // namespace kinespace::cli

@@ -1,0 +1,28 @@
+// What the subcommands that make motions share: the file, the picture, and foot-skate cleanup.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "cli/json_output.h"
+#include "motion/clip.h"
+#include "motion/strip.h"
+
+namespace kinespace::cli {
+
+struct SynthesisOutput {
+  std::filesystem::path file;
+  std::optional<std::filesystem::path> picture;
+  bool clean_feet = false;
+  bool json = false;
+};
+
+// Neither the motion nor its picture may be the library itself.
+void require_no_overwriting(const SynthesisOutput& output, const std::filesystem::path& library);
+
+// Cleans the feet when asked, writes the motion and the picture, and adds to `result`: output, frames, duration_s,
+// rate_hz, and what the cleanup did. `bands`: what to mark in the picture.
+void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result);
+
+}  // namespace kinespace::cli
