@@ -86,7 +86,7 @@ class EndFitter {
 
   [[nodiscard]] bool keeps(const Slide& slide, int from, int frame) const {
     const double length = tracks_.feet.leg_length_cm;
-    const auto near = [&](double stray) { return std::clamp(4 * stray, 0.00004 * length, 0.006 * length); };
+    const auto near = [&](double stray) { return std::clamp(4 * stray, 0.00004 * length, 0.004 * length); };
     const Eigen::Vector3d off = path_[frame] - slide.at(frame);
     const Eigen::Vector3d way = tracks_.root[frame] - tracks_.root[from];
     const double slid = 0.15 * slide.speed.norm() * std::abs(frame - from) + 0.2 * std::hypot(way.x(), way.z());

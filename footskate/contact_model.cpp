@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t neighbours = 5;
 constexpr float unlike_anything = 0.25F;  // leg lengths: no labelled keyframe within it
+constexpr float very_like = 0.1F;         // so near that "not planted" outweighs a rest
 
 // The distance of the nearest keyframe and the share of the nearest ones in which ankle and toe stand.
 struct Vote {
@@ -76,18 +77,46 @@ void close_gaps(std::vector<char>& planted, int longest) {
   }
 }
 
+// Adds what the rule plants for long and the votes do not, where no labelled keyframe is very like; but for the ends.
+FootContacts with_missed(const FootContacts& found, const FootContacts& by_rule,
+                         const std::array<std::vector<float>, 2>& distance, double rate_hz) {
+  const int shortest = static_cast<int>(std::ceil(0.2 * rate_hz));
+  const int end = static_cast<int>(std::ceil(0.05 * rate_hz));
+  const int frames = static_cast<int>(distance[0].size());
+  FootContacts out;
+  for (int slot = 0; slot < 4; ++slot) {
+    std::vector<char> planted = planted_frames(found, slot, frames);
+    for (const FootContact& c : by_rule) {
+      const int length = c.last_frame - c.first_frame + 1;
+      if (c.slot != slot || length < shortest) continue;
+      const auto near = distance[slot / 2].begin();
+      const auto known =
+          std::count_if(near + c.first_frame, near + c.last_frame + 1, [](float d) { return d <= very_like; });
+      if (2 * known >= length) continue;
+      const int first = c.first_frame == 0 ? 0 : c.first_frame + end;
+      const int last = c.last_frame == frames - 1 ? c.last_frame : c.last_frame - end;
+      std::fill(planted.begin() + first, planted.begin() + last + 1, 1);
+    }
+    append_runs(planted, slot, out);
+  }
+  return out;
+}
+
 }  // namespace
 
 FootContacts ContactModel::detect(const FootTracks& tracks, const Ground& ground) const {
   const FootContacts by_rule = contacts_by_rule(tracks, ground);
   const Plausible plausible(tracks, ground);
+  std::array<std::vector<float>, 2> distance;
   FootContacts found;
   for (int leg = 0; leg < 2; ++leg) {
     std::array<std::vector<char>, 2> planted = {planted_frames(by_rule, 2 * leg, tracks.frames),
                                                 planted_frames(by_rule, 2 * leg + 1, tracks.frames)};
+    distance[leg].assign(tracks.frames, std::numeric_limits<float>::infinity());
     const std::vector<Keyframe> queries = keyframes_of(tracks, ground, leg);
     for (std::size_t f = 0; f < queries.size(); ++f) {
       const Vote v = vote(keyframes_, queries[f]);
+      distance[leg][f] = v.distance;
       if (v.distance > unlike_anything) continue;
       for (int joint = 0; joint < 2; ++joint) {
         planted[joint][f] = v.share[joint] >= 0.5 && plausible(2 * leg + joint, static_cast<int>(f)) ? 1 : 0;
@@ -96,7 +125,7 @@ FootContacts ContactModel::detect(const FootTracks& tracks, const Ground& ground
     for (auto& frames : planted) close_gaps(frames, static_cast<int>(0.06 * tracks.rate_hz));
     for (int joint = 0; joint < 2; ++joint) append_runs(planted[joint], 2 * leg + joint, found);
   }
-  return fit_ends(tracks, found);
+  return with_missed(fit_ends(tracks, found), by_rule, distance, tracks.rate_hz);
 }
 
 std::vector<double> ContactModel::distances(const FootTracks& tracks, const Ground& ground) const {

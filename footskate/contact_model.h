@@ -2,10 +2,12 @@
 // (ikemoto 2006; yoo2019, section 6.3).
 //
 // A frame is planted when at least half of its 5 nearest keyframes are, by weights of 1 / (distance^2 + 0.02^2):
-// thinned labels are not evenly dense. Where even the nearest one is far (no labelled clip shows anything like it), and
-// for feet without toe joints, the rule of height and speed decides (contacts_by_rule). What is found must be within 8
-// % of the leg length of the ground's level and not fast, so that no foot is planted in mid-air. Ends are then fitted
-// (fit_ends).
+// thinned labels are not evenly dense. Where even the nearest one is farther than 0.25 leg lengths (no labelled clip
+// shows anything like it), and for feet without toe joints, the rule of height and speed decides (contacts_by_rule).
+// What keyframes plant must be within 8 % of the leg length of the ground's level and not fast, so that no foot is
+// planted in mid-air. Ends are then fitted (fit_ends). What the rule plants for 200 ms or longer is planted too, but
+// for 50 ms at its ends, unless most of it has a keyframe within 0.1: a foot that rests on the ground stands, whatever
+// the body does.
 #pragma once
 
 #include <cstddef>

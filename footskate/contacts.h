@@ -30,7 +30,7 @@ using FootContacts = std::vector<FootContact>;
 
 // Moves the ends of contacts to where the joint leaves its place: a line (a constant for the height) is fitted to the
 // stillest 0.2 s on this side of the middle, and the contact reaches as far as the joint keeps to it. How near it must
-// keep is 4 times what it strays there, at least 0.00004 and at most 0.006 leg lengths, and along the ground 15 % of
+// keep is 4 times what it strays there, at least 0.00004 and at most 0.004 leg lengths, and along the ground 15 % of
 // the way it has slid since and 20 % of the root's; or it must be slower than 0.005 leg lengths a second. An end moves
 // out by 0.1 s at most. Contacts under 50 ms are dropped; those of a slot with less than 80 ms between them, in which
 // the joint stays within 1.2 % of the leg length, are joined.

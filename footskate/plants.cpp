@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double ground_band = 0.05;  // leg lengths
+constexpr double ground_band = 0.08;  // leg lengths: as near as contacts are to the ground
 
 int overlap(const FootContact& a, const FootContact& b) {
   return std::min(a.last_frame, b.last_frame) - std::max(a.first_frame, b.first_frame) + 1;
@@ -163,6 +163,24 @@ double run_out(double s) {
   return s >= 1 ? 0 : s * (1 + s * s * (-6 + s * (8 - 3 * s)));
 }
 
+// Where there is no level, the lower of those before and after; without any, `otherwise`.
+std::vector<double> between_stands(const std::vector<double>& stand, double otherwise) {
+  std::vector<double> before = stand;
+  std::vector<double> after = stand;
+  const std::size_t frames = stand.size();
+  for (std::size_t f = 1; f < frames; ++f) {
+    if (std::isnan(before[f])) before[f] = before[f - 1];
+  }
+  for (std::size_t f = frames - 1; f-- > 0;) {
+    if (std::isnan(after[f])) after[f] = after[f + 1];
+  }
+  for (std::size_t f = 0; f < frames; ++f) {
+    before[f] = std::fmin(before[f], after[f]);
+    if (std::isnan(before[f])) before[f] = otherwise;
+  }
+  return before;
+}
+
 struct GapEnd {
   bool known = false;
   int frame = 0;
@@ -196,22 +214,29 @@ std::vector<Plant> place_plants(const FootTracks& tracks, const Ground& ground, 
 FloorUnder::FloorUnder(const FootTracks& tracks, const Ground& ground, const std::vector<Plant>& plants, int leg)
     : ground_(ground) {
   if (ground.kind != GroundKind::uneven) return;
-  const int slot = tracks.has(2 * leg + 1) ? 2 * leg + 1 : 2 * leg;
-  std::vector<double> after(tracks.frames, std::nan(""));
+  std::vector<double> stand(tracks.frames, std::nan(""));
+  const double ankle_height = standing_heights(tracks, ground)[2 * leg];
   for (const Plant& p : plants) {
-    if (p.contact.slot != slot) continue;
-    std::fill(after.begin() + p.contact.first_frame, after.begin() + p.contact.last_frame + 1, p.place.y());
+    if (p.contact.slot / 2 != leg) continue;
+    const double level = p.place.y() - (p.contact.slot % 2 == 0 ? ankle_height : 0);
+    for (int f = p.contact.first_frame; f <= p.contact.last_frame; ++f) stand[f] = std::fmin(stand[f], level);
   }
-  level_ = after;
-  for (int f = 1; f < tracks.frames; ++f) {
-    if (std::isnan(level_[f])) level_[f] = level_[f - 1];
-  }
-  for (int f = tracks.frames - 2; f >= 0; --f) {
-    if (std::isnan(after[f])) after[f] = after[f + 1];
-  }
+  level_ = between_stands(stand, ground.height_cm);
+  lower_to_foot(tracks, leg, stand);
+}
+
+// Between stands: where the captured foot goes far below both, the ground is lower than they are.
+void FloorUnder::lower_to_foot(const FootTracks& tracks, int leg, const std::vector<double>& stand) {
+  const double far = ground_band * tracks.feet.leg_length_cm;
+  const Path& lowest = tracks.at[tracks.has(2 * leg + 1) ? 2 * leg + 1 : 2 * leg];
   for (int f = 0; f < tracks.frames; ++f) {
-    level_[f] = std::fmin(level_[f], after[f]);
-    if (std::isnan(level_[f])) level_[f] = ground.height_cm;
+    if (!std::isnan(stand[f])) continue;
+    int last = f;
+    while (last + 1 < tracks.frames && std::isnan(stand[last + 1])) ++last;
+    double depth = 0;
+    for (int i = f; i <= last; ++i) depth = std::max(depth, level_[i] - lowest[i].y());
+    for (int i = f; depth > far && i <= last; ++i) level_[i] -= depth;
+    f = last;
   }
 }
 
@@ -247,6 +272,7 @@ FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& 
       out.displacement[f] = *toe[f] + turned(out.turn[f], way) - ankle_path[f];
     }
   }
+  join_between(out.planted, tracks.rate_hz, out.turn);
   return out;
 }
 

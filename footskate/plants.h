@@ -19,7 +19,7 @@ struct Plant {
 // One place a contact. Contacts of one foot that overlap are one stance: the joint that stands longest gets the mean of
 // its places across the ground and the median of its heights; the other joint stands at the foot's length from it, in
 // the mean direction of the frames in which both stand. Then the stance is set on the ground by its toe (of a foot
-// without: by its ankle), if that is within 5 % of the leg length of it, and the ground is not uneven.
+// without: by its ankle), if that is within 8 % of the leg length of it, and the ground is not uneven.
 [[nodiscard]] std::vector<Plant> place_plants(const FootTracks& tracks, const Ground& ground,
                                               const FootContacts& contacts);
 
@@ -27,11 +27,12 @@ struct Plant {
 struct FootTask {
   std::vector<char> planted;                  // ankle or toe
   std::vector<char> flat;                     // both: the turn of the foot is given
-  std::vector<Eigen::Vector3d> turn;          // rotation vector, world; between the flat frames smoothly on and off
+  std::vector<Eigen::Vector3d> turn;          // rotation vector, world
   std::vector<Eigen::Vector3d> displacement;  // cm, world, of the ankle; zero where not planted
 };
 
-// The level that a foot may not go below: the ground; on uneven ground the lower of its plants before and after.
+// The level that a foot may not go below: the ground; on uneven ground the lower of its plants before and after, or,
+// where the captured foot goes below that by more than 8 % of the leg length, the lowest that it goes.
 class FloorUnder {
  public:
   FloorUnder(const FootTracks& tracks, const Ground& ground, const std::vector<Plant>& plants, int leg);
@@ -40,11 +41,14 @@ class FloorUnder {
   }
 
  private:
+  void lower_to_foot(const FootTracks& tracks, int leg, const std::vector<double>& stand);
+
   Ground ground_;
   std::vector<double> level_;  // uneven only
 };
 
-// Where one joint stands and the other would be under the floor, the foot turns until it is on it.
+// Where one joint stands and the other would be under the floor, the foot turns until it is on it. Between plants a
+// turn is carried over as join_between does.
 [[nodiscard]] FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& plants,
                                  const FloorUnder& floor);
 
