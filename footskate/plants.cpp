@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Geometry>
 
@@ -18,6 +19,12 @@ int overlap(const FootContact& a, const FootContact& b) {
 
 int length(const FootContact& c) {
   return c.last_frame - c.first_frame + 1;
+}
+
+// The frames but for a tenth, and at least one, at both ends, where a joint may be coming or leaving.
+std::pair<int, int> core(int first, int last) {
+  const int off = last - first >= 3 ? std::max(1, (last - first) / 10) : 0;
+  return {first + off, last - off};
 }
 
 double median_height(const Path& path, const FootContact& c) {
@@ -81,22 +88,40 @@ class Placer {
     const double above = plants_[base].place.y() - ground_.at(plants_[base].place);
     if (ground_.kind == GroundKind::uneven || std::abs(above) > ground_band * t_.feet.leg_length_cm) return;
     for (const std::size_t i : stance) plants_[i].place.y() -= above;
+    for (const std::size_t i : stance) {
+      if (i != base && lowest(i)) level(i, stance);
+    }
+  }
+
+  // Sets another stand of the lowest joint on the ground, at the foot's length from the joint it stands with.
+  void level(std::size_t i, const std::vector<std::size_t>& stance) {
+    const auto other = std::ranges::find_if(stance, [&](std::size_t j) {
+      return plants_[j].contact.slot != plants_[i].contact.slot && overlap(plants_[i].contact, plants_[j].contact) > 0;
+    });
+    if (other == stance.end()) return;
+    const Vector3d way = plants_[i].place - plants_[*other].place;
+    const double drop = ground_.at(plants_[i].place) - plants_[*other].place.y();
+    const Vector3d along(way.x(), 0, way.z());
+    if (std::abs(drop) >= way.norm() || along.norm() < 1e-6) return;
+    const double reach = std::sqrt(way.squaredNorm() - drop * drop);
+    plants_[i].place = plants_[*other].place + along.normalized() * reach + drop * Vector3d::UnitY();
   }
 
   [[nodiscard]] Vector3d own_place(const FootContact& c) const {
     const Path& path = t_.at[c.slot];
+    const auto [first, last] = core(c.first_frame, c.last_frame);
     Vector3d sum = Vector3d::Zero();
-    for (int f = c.first_frame; f <= c.last_frame; ++f) sum += path[f];
-    Vector3d place = sum / length(c);
+    for (int f = first; f <= last; ++f) sum += path[f];
+    Vector3d place = sum / (last - first + 1);
     place.y() = median_height(path, c);
     return place;
   }
 
   // From the joint of `a` to that of `b`: as long as in the first common frame, in the mean direction of all of them.
   [[nodiscard]] Vector3d mean_way(const FootContact& a, const FootContact& b) const {
-    const int first = std::max(a.first_frame, b.first_frame);
+    const auto [first, last] = core(std::max(a.first_frame, b.first_frame), std::min(a.last_frame, b.last_frame));
     Vector3d sum = Vector3d::Zero();
-    for (int f = first; f <= std::min(a.last_frame, b.last_frame); ++f) sum += t_.at[b.slot][f] - t_.at[a.slot][f];
+    for (int f = first; f <= last; ++f) sum += t_.at[b.slot][f] - t_.at[a.slot][f];
     return sum.normalized() * (t_.at[b.slot][first] - t_.at[a.slot][first]).norm();
   }
 
@@ -211,6 +236,26 @@ std::vector<Plant> place_plants(const FootTracks& tracks, const Ground& ground, 
   return Placer(tracks, ground, contacts).place();
 }
 
+namespace {
+
+// A stand in which the foot has to move by less than half a millimetre stays as it is: near full length of the leg even
+// that would move the knee. But a foot under the ground is lifted.
+void leave_still(const FootTracks& tracks, int leg, FootTask& task) {
+  constexpr double still_cm = 0.05;
+  const double length = tracks.has(2 * leg + 1) ? (tracks.at[2 * leg + 1][0] - tracks.at[2 * leg][0]).norm() : 0;
+  for (int f = 0; f < tracks.frames; ++f) {
+    if (task.planted[f] == 0) continue;
+    const int first = f;
+    double most = 0;
+    for (; f < tracks.frames && task.planted[f] != 0; ++f) {
+      most = std::max({most, task.displacement[f].norm(), length * task.turn[f].norm(), 10 * task.displacement[f].y()});
+    }
+    for (int i = first; most <= still_cm && i < f; ++i) task.displacement[i] = task.turn[i] = Vector3d::Zero();
+  }
+}
+
+}  // namespace
+
 FloorUnder::FloorUnder(const FootTracks& tracks, const Ground& ground, const std::vector<Plant>& plants, int leg)
     : ground_(ground) {
   if (ground.kind != GroundKind::uneven) return;
@@ -272,6 +317,7 @@ FootTask foot_task(const FootTracks& tracks, int leg, const std::vector<Plant>& 
       out.displacement[f] = *toe[f] + turned(out.turn[f], way) - ankle_path[f];
     }
   }
+  leave_still(tracks, leg, out);
   join_between(out.planted, tracks.rate_hz, out.turn);
   return out;
 }

@@ -17,9 +17,10 @@ struct Plant {
 };
 
 // One place a contact. Contacts of one foot that overlap are one stance: the joint that stands longest gets the mean of
-// its places across the ground and the median of its heights; the other joint stands at the foot's length from it, in
-// the mean direction of the frames in which both stand. Then the stance is set on the ground by its toe (of a foot
-// without: by its ankle), if that is within 8 % of the leg length of it, and the ground is not uneven.
+// its places across the ground (but for a tenth at both ends, where it may be coming or leaving) and the median of its
+// heights; the other joint stands at the foot's length from it, in the mean direction of the frames in which both
+// stand. Then the stance is set on the ground by its toe (of a foot without: by its ankle), if that is within 8 % of
+// the leg length of it, and the ground is not uneven.
 [[nodiscard]] std::vector<Plant> place_plants(const FootTracks& tracks, const Ground& ground,
                                               const FootContacts& contacts);
 
