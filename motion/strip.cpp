@@ -256,6 +256,8 @@ class Strip {
       const auto [low, high] = std::minmax({frame_px(first), frame_px(last)});
       const double top = margin_px + header_px - 8;
       svg.rectangle({low, top}, {high - low, floor_px_ - top}, "#fdf0c4");
+      constexpr double character_px = 5.5;  // of the label's size, about
+      if (character_px * static_cast<double>(band.label.size()) > high - low) continue;  // it would cover its neighbours
       svg.label({(low + high) / 2, top + 11}, band.label, "middle", 11, "#8a6d00");
     }
   }
