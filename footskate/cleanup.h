@@ -28,7 +28,7 @@ struct CleanOptions {
   std::optional<double> floor_cm;        // the ground is flat at this height, -1e5 to 1e5; none: estimated
   std::optional<FootContacts> contacts;  // these and no others; none: detected
   const ContactModel* model = nullptr;   // detects them; null: the model that comes with the library
-  int passes = 8;                        // 1 to 20
+  int passes = 12;                       // 1 to 20
   void validate() const;                 // throws Error{usage} naming field, value and range
 };
 

@@ -69,8 +69,8 @@ class EndFitter {
   // it may be leaving already.
   [[nodiscard]] Window stillest(int step) const {
     const int length = contact_.last_frame - contact_.first_frame + 1;
-    const int most = std::min(length, std::max(3, length / 2));
-    const int span = std::clamp(static_cast<int>(0.2 * tracks_.rate_hz), std::min(3, length), most);
+    const int most = std::min(length, std::max(2, length / 2));
+    const int span = std::clamp(static_cast<int>(0.2 * tracks_.rate_hz), std::min(2, most), most);
     const int reach = std::min(length - span, std::max(length / 4, static_cast<int>(0.1 * tracks_.rate_hz)));
     Window best{};
     double least = std::numeric_limits<double>::infinity();
