@@ -6,13 +6,16 @@
 #include <random>
 #include <vector>
 
-#include <fmt/format.h>
-#include <tbb/parallel_for.h>
-
 #include "bench/bench_library.h"
 #include "bench/report.h"
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include "synthesis/connection.h"
+#include "synthesis/motion_graph.h"
 #include "synthesis/transition.h"
+#include "synthesis/transition_plan.h"
 
 namespace kinespace {
 namespace {
@@ -69,11 +72,46 @@ void connection_rows(const std::string& data, LibraryView& view, BenchReport& re
     // The objective is E, the square of the cost.
     agreeing += !found[i] || std::pow(found[i]->cost_cm / wanted[i]->cost_cm, 2) <= 1.01 ? 1 : 0;
   }
-  report.results.push_back({.name = "connections within 1 % of brute force", .data = data,
-                            .value = 100.0 * agreeing / static_cast<double>(pairs.size()), .unit = "%", .bar = 99,
+  report.results.push_back({.name = "connections within 1 % of brute force",
+                            .data = data,
+                            .value = 100.0 * agreeing / static_cast<double>(pairs.size()),
+                            .unit = "%",
+                            .bar = 99,
                             .higher_is_better = true});
-  report.results.push_back({.name = "time of a connection, tables built, one core", .data = data,
-                            .value = 1e3 * seconds / static_cast<double>(pairs.size()), .unit = "ms", .bar = 2});
+  report.results.push_back({.name = "time of a connection, tables built, one core",
+                            .data = data,
+                            .value = 1e3 * seconds / static_cast<double>(pairs.size()),
+                            .unit = "ms",
+                            .bar = 2});
+}
+
+// Every pair of clips, those skipped that the lower bound rules out.
+void graph_rows(const std::string& data, LibraryView& view, BenchReport& report) {
+  const auto start = Clock::now();
+  const MotionGraph graph = MotionGraph::make(view, view.library().spaces().front().id, {});
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  const auto clips = static_cast<double>(graph.clips().size());
+  report.results.push_back({.name = "graph of all clips, for 1000 clips (by the number of pairs), 2 threads",
+                            .data = data,
+                            .value = seconds / 60 * (1000 / clips) * (1000 / clips),
+                            .unit = "min",
+                            .bar = 20});
+  const auto pairs = random_pairs(graph.clips().size(), 500);
+  int without = 0;
+  double played = 0;
+  for (const auto& [from, to] : pairs) {
+    const auto path = graph.path(graph.clips()[from], graph.clips()[to]);
+    without += path ? 0 : 1;
+    played += path ? static_cast<double>(path->clips.size()) : 0;
+  }
+  report.results.push_back({.name = "pairs without a way through the graph",
+                            .data = data,
+                            .value = 100.0 * without / static_cast<double>(pairs.size()),
+                            .unit = "%"});
+  report.results.push_back({.name = "clips played on the way, mean",
+                            .data = data,
+                            .value = played / static_cast<double>(pairs.size()),
+                            .unit = "clips"});
 }
 
 double median(std::vector<double> values) {
@@ -111,16 +149,38 @@ void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) 
   row("seam: the same, worst", std::ranges::max(acceleration), 2);
 }
 
+// The same through the graph, which the first pair makes and keeps in the bench's library.
+void path_rows(const std::string& data, LibraryView& view, BenchReport& report) {
+  const auto rows = view.library().clips();
+  std::vector<double> ratios;
+  for (const auto& [first, second] : random_pairs(rows.size(), 60)) {
+    const std::vector<std::string> names{rows[first].name, rows[second].name};
+    const auto plan = plan_transition(view, names, {.via_graph = true});
+    if (!plan) continue;
+    for (const Join& join : plan->transition.joins) ratios.push_back(join.ratios.worst());
+  }
+  report.results.push_back({.name = "seam: speed or acceleration, median of the seams of 60 ways through the graph",
+                            .data = data,
+                            .value = median(ratios),
+                            .unit = "x",
+                            .bar = 1});
+  report.results.push_back(
+      {.name = "seam: the same, worst", .data = data, .value = std::ranges::max(ratios), .unit = "x", .bar = 2});
+}
+
 }  // namespace
 
 BenchReport bench_transitions(const BenchOptions& options) {
-  BenchReport report{.bench = "transitions", .device = "processor", .threads = 1};
+  BenchReport report{.bench = "transitions", .device = "processor", .threads = tbb::this_task_arena::max_concurrency()};
   BenchLibrary bandai({options.data / "bandai2"});
-  if (!std::getenv("NOCONN")) connection_rows("bandai2", bandai.view(), report);
+  connection_rows("bandai2", bandai.view(), report);
   seam_rows("bandai2", bandai.view(), report);
+  graph_rows("bandai2", bandai.view(), report);
+  path_rows("bandai2", bandai.view(), report);
   BenchLibrary cmu({options.data / "cmu"});
-  if (!std::getenv("NOCONN")) connection_rows("cmu", cmu.view(), report);
+  connection_rows("cmu", cmu.view(), report);
   seam_rows("cmu", cmu.view(), report);
+  path_rows("cmu", cmu.view(), report);
   return report;
 }
 

@@ -48,8 +48,10 @@ void add_blend(CLI::App& app, Session& /*session*/) {
       command->add_option("--weights", options->weights, "A plain blend: one weight a clip")->delimiter(',');
   command->add_option("--at", options->blend.at, "One point of the curve: 0 is the first clip, 1 the second, ..")
       ->excludes(weights);
-  command->add_option("--neighbours", options->blend.neighbours,
-                      "Near motions of each clip that may be control points; 0: none")->capture_default_str();
+  command
+      ->add_option("--neighbours", options->blend.neighbours,
+                   "Near motions of each clip that may be control points; 0: none")
+      ->capture_default_str();
   command->add_option("--lod", options->functions, "Use only the first N functions")->check(CLI::NonNegativeNumber);
   command->add_flag("--clean-feet", options->output.clean_feet, "Take foot skate out of the result");
   command->add_option("--picture", options->output.picture, "Also write stick figures, .svg");

@@ -65,7 +65,9 @@ std::vector<StripBand> bands_of(const PlannedTransition& plan) {
   const Clip& clip = plan.transition.clip;
   for (std::size_t i = 0; i < plan.transition.joins.size(); ++i) {
     const double begin = plan.transition.begin[i], end = begin + plan.transition.joins[i].duration_s;
-    const auto frame = [&](double time) { return std::clamp(static_cast<int>(time * clip.rate_hz), 0, clip.frames - 1); };
+    const auto frame = [&](double time) {
+      return std::clamp(static_cast<int>(time * clip.rate_hz), 0, clip.frames - 1);
+    };
     out.push_back({.first_frame = frame(begin), .last_frame = frame(end), .label = "to " + plan.pieces[i + 1]});
   }
   return out;
@@ -99,8 +101,10 @@ void add_transition(CLI::App& app, Session& session) {
                     "Lead through other clips where motions are far apart; the first time makes the library's graph");
   command->add_option("--max-cost", options->plan.graph.largest_cost_cm, "The farthest step of the graph, in cm")
       ->capture_default_str();
-  command->add_option("--window", options->plan.graph.connection.window_s,
-                      "Seconds of the end of one and the start of the next that may overlap")->capture_default_str();
+  command
+      ->add_option("--window", options->plan.graph.connection.window_s,
+                   "Seconds of the end of one and the start of the next that may overlap")
+      ->capture_default_str();
   command->add_option("--overlap", options->plan.graph.connection.shortest_s, "The smallest overlap in seconds")
       ->capture_default_str();
   command->add_flag("--clean-feet", options->output.clean_feet, "Take foot skate out of the result");

@@ -2,8 +2,8 @@
 //
 //   next-motion LIB.kspace FROM TO
 //
-// Plays FROM with the detail that a camera's distance asks for, finds out how it goes over into TO - directly or through
-// other motions - and writes the whole as next-motion.bvh.
+// Plays FROM with the detail that a camera's distance asks for, finds out how it goes over into TO - directly or
+// through other motions - and writes the whole as next-motion.bvh.
 #include <cstdio>
 #include <string>
 #include <vector>

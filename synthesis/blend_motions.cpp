@@ -94,7 +94,8 @@ Placement blended_placement(std::span<const ClipCurves> motions, const Eigen::Ve
 
 void require_motion(const ClipCurves& motion) {
   if (motion.frames() > 1) return;
-  throw Error(ErrorKind::bad_input, {.found = motion.name + " of a single frame", .expected = "a motion of two frames or more"});
+  throw Error(ErrorKind::bad_input,
+              {.found = motion.name + " of a single frame", .expected = "a motion of two frames or more"});
 }
 
 std::string joined_names(std::span<const ClipCurves> motions) {
@@ -117,7 +118,9 @@ BlendedMotion blend_motions(std::span<const ClipCurves> motions, const Skeleton&
   const double rate = motions[0].rate_hz;
   constexpr double rounding = 1e-6;  // of a frame
   const int frames = static_cast<int>(std::floor(clock.duration_s() * rate + rounding)) + 1;
-  ClipCurves out{.name = joined_names(motions), .rate_hz = rate, .placement = motions[0].placement,
+  ClipCurves out{.name = joined_names(motions),
+                 .rate_hz = rate,
+                 .placement = motions[0].placement,
                  .values = SampleMatrix::Zero(frames, samplers[0].curves())};
   std::vector<std::vector<FramePart>> parts(static_cast<std::size_t>(frames));
   SampleMatrix travel(static_cast<Eigen::Index>(motions.size()), travel_curves), travel_before = travel;
@@ -134,8 +137,7 @@ BlendedMotion blend_motions(std::span<const ClipCurves> motions, const Skeleton&
       samplers[m].at(own(i), pose);
       travel.row(i) = pose.head<travel_curves>();
       for (Eigen::Index j = 0; j < sides.cols(); ++j) {
-        row.segment<4>(travel_curves + 4 * j) +=
-            weight(i) * sides(i, j) * pose.segment<4>(travel_curves + 4 * j);
+        row.segment<4>(travel_curves + 4 * j) += weight(i) * sides(i, j) * pose.segment<4>(travel_curves + 4 * j);
       }
       parts[static_cast<std::size_t>(f)].push_back({m, own(i), weight(i)});
     }
@@ -143,8 +145,8 @@ BlendedMotion blend_motions(std::span<const ClipCurves> motions, const Skeleton&
     // Velocities are blended, not places: the weights of the step between two frames say where it leads.
     if (f > 0) {
       const Eigen::VectorXd between = weights((share + share_before) / 2);
-      row.head<travel_curves>() = out.values.row(f - 1).head<travel_curves>() +
-                                  between.transpose() * (travel - travel_before);
+      row.head<travel_curves>() =
+          out.values.row(f - 1).head<travel_curves>() + between.transpose() * (travel - travel_before);
     }
     travel_before = travel;
     share_before = share;

@@ -14,53 +14,23 @@
 #include "synthesis/connection_detail.h"
 
 namespace kinespace {
+
+using namespace connections;
+
 namespace {
 
 constexpr int fine_points = 1025;
 constexpr int function_points = 129;
-constexpr int bound_cells = connection_bound_cells;
 constexpr int points_per_cell = 4;
 constexpr int stretch_points = bound_cells * points_per_cell + 1;  // a stretch is scored at so many points
-constexpr int overlap_points = 32;     // of the integral over an overlap
-constexpr double least_overlap = 0.1;  // |S| that is tabulated
-constexpr double least_speed = 0.5, largest_speed = 2;
-constexpr int scales_per_octave = 4, octaves = 3;  // u from 1/8 to 8
-constexpr double shift_steps = 40;                 // per unit of the faster clock
+constexpr int overlap_points = 32;                                 // of the integral over an overlap
+constexpr double least_overlap = 0.1;                              // |S| that is tabulated
+constexpr int scales_per_octave = 4, octaves = 3;                  // u from 1/8 to 8
+constexpr double shift_steps = 40;                                 // per unit of the faster clock
 constexpr int minima_refined = 5;
 constexpr double worth_refining = 2;  // cells that cost so many times the best are left
 constexpr int refinements = 6;
 constexpr int most_functions = 64;
-constexpr double infinite = std::numeric_limits<double>::infinity();
-
-struct Interval {
-  double begin = 0, end = 0;
-  [[nodiscard]] double length() const { return end - begin; }
-};
-
-// S: where s and u s + v both lie in [0, 1].
-Interval overlap_of(double u, double v) {
-  return {std::max(0.0, -v / u), std::min(1.0, (1 - v) / u)};
-}
-
-// The shifts for which the overlap is at least `least` long (in s); empty (begin > end) when there are none.
-Interval shifts_for(double u, double least) {
-  return {-u * (1 - least), 1 - u * least};
-}
-
-double speed_of(const ConnectionMotion& first, const ConnectionMotion& second, double u) {
-  return u * first.length_s / second.length_s;
-}
-
-// The smallest |S| that lasts `shortest_s` by either clock.
-double least_overlap_of(const ConnectionMotion& first, const ConnectionMotion& second, double u, double shortest_s) {
-  return std::max(shortest_s / second.length_s, shortest_s / (u * first.length_s));
-}
-
-bool legal_speed(double speed) {
-  constexpr double rounding = 1e-9;
-  return speed >= least_speed - rounding && speed <= largest_speed + rounding;
-}
-
 // What motions can be scored in: an orthonormal basis (trapezoid rule) of the span of 1, the mean and the functions.
 SampleMatrix orthonormal_functions(const MotionSpace& space, int count) {
   const auto group = std::ranges::max_element(space.groups(), {}, &FunctionGroup::variance);
@@ -128,10 +98,11 @@ void add_poses(const SampleMatrix& curves, ConnectionMotion& motion) {
   for (int i = 0; i < bound_cells; ++i) {
     const Eigen::Index middle = i * points_per_cell + points_per_cell / 2;
     motion.poses.row(i) = curves.row(middle).cast<float>();
-    motion.spread(i) = static_cast<float>((curves.middleRows(i * points_per_cell, points_per_cell + 1).rowwise() - curves.row(middle))
-                                              .rowwise()
-                                              .norm()
-                                              .maxCoeff());
+    motion.spread(i) =
+        static_cast<float>((curves.middleRows(i * points_per_cell, points_per_cell + 1).rowwise() - curves.row(middle))
+                               .rowwise()
+                               .norm()
+                               .maxCoeff());
   }
 }
 
@@ -145,7 +116,8 @@ void ConnectionOptions::validate() const {
   if (!(shortest_s >= 0.1 && shortest_s <= window_s)) {
     fail(fmt::format("shortest_s = {}", shortest_s), "from 0.1 to window_s");
   }
-  if (functions < 4 || functions > most_functions) fail(fmt::format("functions = {}", functions), fmt::format("from 4 to {}", most_functions));
+  if (functions < 4 || functions > most_functions)
+    fail(fmt::format("functions = {}", functions), fmt::format("from 4 to {}", most_functions));
 }
 
 // The forms in the scores that E is made of, apart for rates and the rest.
@@ -155,9 +127,7 @@ struct ConnectionSpace::Forms {
   Eigen::MatrixXf cross_rates, cross_rest, own_of_second;
 
   [[nodiscard]] double speed(double u) const { return speed_of(*first, *second, u); }
-  [[nodiscard]] Eigen::MatrixXf own_of_first(float speed) const {
-    return speed * speed * first->rates + first->rest;
-  }
+  [[nodiscard]] Eigen::MatrixXf own_of_first(float speed) const { return speed * speed * first->rates + first->rest; }
   [[nodiscard]] Eigen::MatrixXf cross(float speed) const { return speed * cross_rates + cross_rest; }
 };
 
@@ -239,8 +209,7 @@ ConnectionMotion ConnectionSpace::stretch_of(const CurveSampler& clip, double st
   }
   // Least squares rather than plain integrals: the grid of a stretch is coarser than that of the functions.
   const Eigen::MatrixXd weighted = trapezoid_weights(stretch_points, 1.0).asDiagonal() * functions;
-  const Eigen::MatrixXd scores =
-      (weighted.transpose() * functions).ldlt().solve(weighted.transpose() * poses);
+  const Eigen::MatrixXd scores = (weighted.transpose() * functions).ldlt().solve(weighted.transpose() * poses);
 
   ConnectionMotion out{.start_s = start_s, .length_s = length_s, .scores = scores.cast<float>()};
   const SampleMatrix curves = functions * scores;
@@ -267,8 +236,8 @@ ConnectionSpace::Forms ConnectionSpace::forms(const ConnectionMotion& first, con
   const Eigen::Index rest = weights_.size() - InvariantPose::rates;
   return {.first = &first,
           .second = &second,
-          .cross_rates = first.scores.leftCols(InvariantPose::rates) *
-                         second.scores.leftCols(InvariantPose::rates).transpose(),
+          .cross_rates =
+              first.scores.leftCols(InvariantPose::rates) * second.scores.leftCols(InvariantPose::rates).transpose(),
           .cross_rest = first.scores.rightCols(rest) * second.scores.rightCols(rest).transpose(),
           .own_of_second = second.rates + second.rest};
 }
@@ -299,114 +268,136 @@ double ConnectionSpace::cost(const ConnectionMotion& first, const ConnectionMoti
   return evaluate(forms(first, second), u, v);
 }
 
-namespace {
+// The legal range of a pair, and where in it one is: the scale by its logarithm, the shift by its share of what is
+// legal at that scale, so that the range is a box.
+struct ConnectionSpace::LegalRange {
+  const ConnectionMotion* first;
+  const ConnectionMotion* second;
+  double shortest_s;
 
-// A point of the legal range: the scale by its logarithm, the shift by its share of what is legal at that scale.
-struct LegalPoint {
-  double log_u = 0;
-  double share = 0;
+  struct Point {
+    double log_u = 0;
+    double share = 0;
+  };
+  // log u at which both motions play at the same speed.
+  [[nodiscard]] double even() const { return std::log2(second->length_s / first->length_s); }
+  [[nodiscard]] Interval scales() const {
+    constexpr double limit = octaves;
+    return {std::max(even() - 1, -limit), std::min(even() + 1, limit)};
+  }
+  [[nodiscard]] Interval shifts(double log_u) const {
+    const double u = std::exp2(log_u);
+    return shifts_for(u, least_overlap_of(*first, *second, u, shortest_s));
+  }
+  [[nodiscard]] double shift(const Point& point) const {
+    const Interval legal = shifts(point.log_u);
+    return legal.begin + point.share * legal.length();
+  }
+  [[nodiscard]] bool legal(double log_u) const {
+    const Interval shifts_there = shifts(log_u);
+    return shifts_there.begin <= shifts_there.end;
+  }
 };
 
-}  // namespace
+struct ConnectionSpace::Minimum {
+  double cost = 0;
+  LegalRange::Point at;
+};
 
-std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first, const ConnectionMotion& second,
-                                                   double shortest_s, double give_up_cm) const {
-  const double shortest = shortest_s > 0 ? shortest_s : options_.shortest_s;
-  const double even = std::log2(second.length_s / first.length_s);  // log u at which both play at the same speed
-  const Interval scales{std::max(even - 1, -static_cast<double>(octaves)), std::min(even + 1, static_cast<double>(octaves))};
-  const auto legal_shifts = [&](double log_u) {
-    const double u = std::exp2(log_u);
-    return shifts_for(u, least_overlap_of(first, second, u, shortest));
-  };
-
-  // The table's cells, each with the value of the best of its neighbourhood along the shift.
-  const Forms parts = forms(first, second);
+// The minima of the table along the shift, for every legal scale, lowest first.
+std::vector<ConnectionSpace::Minimum> ConnectionSpace::minima_of_table(const Forms& parts,
+                                                                       const LegalRange& range) const {
+  const Interval scales = range.scales();
   const auto count = functions_.cols();
-  const Eigen::Index packed = count * (count + 1) / 2;
-  struct Minimum {
-    double cost = 0;
-    LegalPoint at;
-  };
   std::vector<Minimum> minima;
-  Eigen::VectorXf form(2 * packed + count * count);
-  Eigen::VectorXf costs;
+  Eigen::VectorXf form(count * (count + 1) + count * count), costs;
   for (const Cells& cells : table_) {
     const double log_u = std::log2(cells.u);
-    if (log_u < scales.begin - 1e-9 || log_u > scales.end + 1e-9) continue;
-    const Interval legal = legal_shifts(log_u);
-    if (legal.begin > legal.end) continue;
+    if (log_u < scales.begin - 1e-9 || log_u > scales.end + 1e-9 || !range.legal(log_u)) continue;
+    const Interval legal = range.shifts(log_u);
     const auto begin = std::ranges::lower_bound(cells.shifts, legal.begin) - cells.shifts.begin();
     const auto end = std::ranges::upper_bound(cells.shifts, legal.end) - cells.shifts.begin();
+    if (begin == end) minima.push_back({infinite, {log_u, 0.5}});  // a range between two cells
+
     const auto speed = static_cast<float>(parts.speed(cells.u));
-    const Eigen::MatrixXf first_own = parts.own_of_first(speed);
-    const Eigen::MatrixXf cross = parts.cross(speed);
+    const Eigen::MatrixXf first_own = parts.own_of_first(speed), cross = parts.cross(speed);
     Eigen::Index at = 0;
     for (const auto* own : {&first_own, &parts.own_of_second}) {
       for (Eigen::Index c = 0; c < count; ++c, at += c) form.segment(at, c + 1) = own->col(c).head(c + 1);
     }
     form.tail(count * count) = cross.reshaped();
     costs = cells.grams.middleRows(begin, end - begin) * form;
-    const double width = std::max(legal.length(), 1e-12);
     for (Eigen::Index i = 0; i < costs.size(); ++i) {
       const bool lowest = (i == 0 || costs(i) <= costs(i - 1)) && (i + 1 == costs.size() || costs(i) <= costs(i + 1));
       if (!lowest) continue;
-      const double v = cells.shifts[static_cast<std::size_t>(begin + i)];
-      minima.push_back({costs(i), {log_u, std::clamp((v - legal.begin) / width, 0.0, 1.0)}});
+      const double share =
+          (cells.shifts[static_cast<std::size_t>(begin + i)] - legal.begin) / std::max(legal.length(), 1e-12);
+      minima.push_back({costs(i), {log_u, std::clamp(share, 0.0, 1.0)}});
     }
-    if (costs.size() == 0) minima.push_back({infinite, {log_u, 0.5}});
   }
-  if (minima.empty()) {  // a range of scales or shifts between two cells of the table
-    const double log_u = std::clamp(even, scales.begin, scales.end);
-    if (scales.begin > scales.end || legal_shifts(log_u).begin > legal_shifts(log_u).end) return std::nullopt;
-    minima.push_back({infinite, {log_u, 0.5}});
+  if (minima.empty()) {  // a range of scales between two of the table
+    const double log_u = std::clamp(range.even(), scales.begin, scales.end);
+    if (scales.begin <= scales.end && range.legal(log_u)) minima.push_back({infinite, {log_u, 0.5}});
   }
   std::ranges::stable_sort(minima, {}, &Minimum::cost);
-  const double least_cm = 100 * std::sqrt(std::max(minima.front().cost, 0.0));
-  if (std::isfinite(least_cm) && least_cm > 1.4 * give_up_cm) return std::nullopt;
+  return minima;
+}
 
-  // Descent along the two coordinates, with steps that halve: the box holds all that is legal.
-  const auto shift_at = [&](const LegalPoint& point) {
-    const Interval legal = legal_shifts(point.log_u);
-    return legal.begin + point.share * legal.length();
+// Descent along the two coordinates of the box, with steps that halve.
+ConnectionSpace::Minimum ConnectionSpace::descend(const Forms& parts, const LegalRange& range,
+                                                  const Minimum& start) const {
+  constexpr std::array<std::array<double, 2>, 4> directions{{{0, 1}, {0, -1}, {1, 0}, {-1, 0}}};
+  constexpr int tries = 4;
+  const Interval scales = range.scales();
+  const auto value_at = [&](const LegalRange::Point& point) {
+    return range.legal(point.log_u) ? evaluate(parts, std::exp2(point.log_u), range.shift(point)) : infinite;
   };
-  const auto value_at = [&](const LegalPoint& point) {
-    const Interval legal = legal_shifts(point.log_u);
-    return legal.begin > legal.end ? infinite : evaluate(parts, std::exp2(point.log_u), shift_at(point));
-  };
+  Minimum here{value_at(start.at), start.at};
+  double scale_step = 0.5 / scales_per_octave, share_step = 0.5 / shift_steps;
+  for (int round = 0; round < refinements; ++round, scale_step /= 2, share_step /= 2) {
+    bool moved = true;
+    for (int i = 0; moved && i < tries; ++i) {
+      moved = false;
+      for (const auto& [du, dv] : directions) {
+        const LegalRange::Point next{std::clamp(here.at.log_u + du * scale_step, scales.begin, scales.end),
+                                     std::clamp(here.at.share + dv * share_step, 0.0, 1.0)};
+        if (next.log_u == here.at.log_u && next.share == here.at.share) continue;
+        const double value = value_at(next);
+        if (value >= here.cost) continue;
+        here = {value, next};
+        moved = true;
+      }
+    }
+  }
+  return here;
+}
+
+std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first, const ConnectionMotion& second,
+                                                   double shortest_s, double give_up_cm) const {
+  const LegalRange range{&first, &second, shortest_s > 0 ? shortest_s : options_.shortest_s};
+  const Forms parts = forms(first, second);
+  const std::vector<Minimum> minima = minima_of_table(parts, range);
+  if (minima.empty()) return std::nullopt;
+  constexpr double worth_looking = 1.4;
+  const double least = minima.front().cost;
+  if (std::isfinite(least) && 100 * std::sqrt(std::max(least, 0.0)) > worth_looking * give_up_cm) return std::nullopt;
+
   Minimum best{infinite, {}};
-  std::vector<LegalPoint> tried;
+  std::vector<LegalRange::Point> tried;
   for (const Minimum& start : minima) {
-    if (tried.size() == minima_refined || (start.cost < infinite && start.cost > worth_refining * minima.front().cost)) break;
-    const bool near = std::ranges::any_of(tried, [&](const LegalPoint& other) {
+    if (tried.size() == minima_refined || (std::isfinite(start.cost) && start.cost > worth_refining * least)) break;
+    const bool near = std::ranges::any_of(tried, [&](const LegalRange::Point& other) {
       return std::abs(other.log_u - start.at.log_u) < 0.6 && std::abs(other.share - start.at.share) < 0.06;
     });
     if (near) continue;
     tried.push_back(start.at);
-    Minimum here{value_at(start.at), start.at};
-    double scale_step = 0.5 / scales_per_octave, share_step = 0.5 / shift_steps;
-    for (int round = 0; round < refinements; ++round) {
-      bool moved = true;
-      for (int tries = 0; moved && tries < 4; ++tries) {
-        moved = false;
-        for (const auto& [du, dv] : std::array<std::array<double, 2>, 4>{{{0, 1}, {0, -1}, {1, 0}, {-1, 0}}}) {
-          const LegalPoint next{std::clamp(here.at.log_u + du * scale_step, scales.begin, scales.end),
-                                std::clamp(here.at.share + dv * share_step, 0.0, 1.0)};
-          if (next.log_u == here.at.log_u && next.share == here.at.share) continue;
-          const double value = value_at(next);
-          if (value < here.cost) {
-            here = {value, next};
-            moved = true;
-          }
-        }
-      }
-      scale_step /= 2;
-      share_step /= 2;
-    }
-    if (here.cost < best.cost) best = here;
+    const Minimum found = descend(parts, range, start);
+    if (found.cost < best.cost) best = found;
   }
   if (best.cost == infinite) return std::nullopt;
 
-  Connection out{.scale = std::exp2(best.at.log_u), .shift = shift_at(best.at), .cost_cm = 100 * std::sqrt(best.cost)};
+  Connection out{
+      .scale = std::exp2(best.at.log_u), .shift = range.shift(best.at), .cost_cm = 100 * std::sqrt(best.cost)};
   const Interval s = overlap_of(out.scale, out.shift);
   out.leave_s = first.start_s + first.length_s * (out.scale * s.begin + out.shift);
   out.left_s = first.start_s + first.length_s * (out.scale * s.end + out.shift);
@@ -414,62 +405,5 @@ std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first
   out.entered_s = second.start_s + second.length_s * s.end;
   return out;
 }
-
-namespace reference {
-
-std::optional<Connection> connect(const ConnectionSpace& space, const ConnectionMotion& first,
-                                  const ConnectionMotion& second, int scales, int shifts) {
-  constexpr int points = 200;
-  const double shortest = space.options().shortest_s;
-  const UniformSpline functions(space.functions());
-  const auto curves_at = [&](const ConnectionMotion& motion, double x, Eigen::RowVectorXd& out) {
-    Eigen::RowVectorXd row(space.functions().cols());
-    functions.value(x * static_cast<double>(space.functions().rows() - 1), row);
-    out = row * motion.scores.cast<double>();
-  };
-  // Each motion's curves on a fine grid, so that the many evaluations below share them.
-  constexpr int grid = 2001;
-  SampleMatrix of_first(grid, first.scores.cols()), of_second(grid, second.scores.cols());
-  Eigen::RowVectorXd row;
-  for (int i = 0; i < grid; ++i) {
-    curves_at(first, static_cast<double>(i) / (grid - 1), row);
-    of_first.row(i) = row;
-    curves_at(second, static_cast<double>(i) / (grid - 1), row);
-    of_second.row(i) = row;
-  }
-  const auto at = [](const SampleMatrix& curves, double x) -> Eigen::RowVectorXd {
-    const double p = std::clamp(x, 0.0, 1.0) * (grid - 1);
-    const auto i = std::min(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(grid - 2));
-    const double b = p - static_cast<double>(i);
-    return (1 - b) * curves.row(i) + b * curves.row(i + 1);
-  };
-
-  std::optional<Connection> best;
-  double least = infinite;
-  for (int i = 0; i < scales; ++i) {
-    const double speed = least_speed * std::pow(largest_speed / least_speed, static_cast<double>(i) / (scales - 1));
-    const double u = speed * second.length_s / first.length_s;
-    const Interval legal = shifts_for(u, least_overlap_of(first, second, u, shortest));
-    if (legal.begin > legal.end) continue;
-    for (int k = 0; k < shifts; ++k) {
-      const double v = legal.begin + legal.length() * k / (shifts - 1);
-      const Interval s = overlap_of(u, v);
-      double sum = 0;
-      for (int p = 0; p < points; ++p) {
-        const double x = s.begin + s.length() * (p + 0.5) / points;
-        Eigen::RowVectorXd difference = at(of_first, u * x + v);
-        difference.head<InvariantPose::rates>() *= speed;
-        sum += (difference - at(of_second, x)).squaredNorm();
-      }
-      if (sum / points < least) {
-        least = sum / points;
-        best = Connection{.scale = u, .shift = v, .cost_cm = 100 * std::sqrt(least)};
-      }
-    }
-  }
-  return best;
-}
-
-}  // namespace reference
 
 }  // namespace kinespace

@@ -49,8 +49,8 @@ struct ConnectionMotion {
   double start_s = 0;      // of the clip
   double length_s = 0;     // L
   Eigen::MatrixXf scores;  // K x C, each curve times its w_c
-  Eigen::MatrixXf poses;   // weighted curves that are no rates, [bound cell][curve]: what bounds a connection from below
-  Eigen::VectorXf spread;  // how far the motion gets from that pose within the cell
+  Eigen::MatrixXf poses;  // weighted curves that are no rates, [bound cell][curve]: what bounds a connection from below
+  Eigen::VectorXf spread;       // how far the motion gets from that pose within the cell
   Eigen::MatrixXf rates, rest;  // K x K: the motion's own parts of S, of curves that are rates and of the rest
 };
 
@@ -83,9 +83,9 @@ class ConnectionSpace {
   // The best connection over the whole legal range, in which the overlap lasts `shortest_s` (that of the options when
   // 0) or longer; none when there is no legal (u, v). Costs above `give_up_cm` are of no interest: none as well when
   // the grid has nothing within 1.4 times of that.
-  [[nodiscard]] std::optional<Connection> connect(
-      const ConnectionMotion& first, const ConnectionMotion& second, double shortest_s = 0,
-      double give_up_cm = std::numeric_limits<double>::infinity()) const;
+  [[nodiscard]] std::optional<Connection> connect(const ConnectionMotion& first, const ConnectionMotion& second,
+                                                  double shortest_s = 0,
+                                                  double give_up_cm = std::numeric_limits<double>::infinity()) const;
 
   // E(u, v) of eq. 15, in square metres, for one (u, v); infinity where it is not legal.
   [[nodiscard]] double cost(const ConnectionMotion& first, const ConnectionMotion& second, double u, double v,
@@ -102,9 +102,13 @@ class ConnectionSpace {
     Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> grams;  // [shift][P, 2Q, W]
   };
   struct Forms;
+  struct LegalRange;
+  struct Minimum;
   void tabulate();
   void interpolate(double x, float* out, Eigen::Index step = 1) const;  // out[k * step]
   [[nodiscard]] Forms forms(const ConnectionMotion& first, const ConnectionMotion& second) const;
+  [[nodiscard]] std::vector<Minimum> minima_of_table(const Forms& forms, const LegalRange& range) const;
+  [[nodiscard]] Minimum descend(const Forms& forms, const LegalRange& range, const Minimum& start) const;
   [[nodiscard]] double evaluate(const Forms& forms, double u, double v) const;
 
   ConnectionOptions options_;

@@ -12,7 +12,7 @@
 namespace kinespace {
 namespace {
 
-constexpr int cells = connection_bound_cells;
+constexpr int cells = connections::bound_cells;
 constexpr int axes = 16;
 
 // The least mean of values over stretches that last at least `length` cells. Within a cell the best border of a stretch

@@ -46,12 +46,14 @@ std::vector<std::size_t> leaving_order(const std::vector<std::vector<std::size_t
 
 Eigen::MatrixXf mean_poses(std::span<const ConnectionMotion* const> motions) {
   Eigen::MatrixXf out(static_cast<Eigen::Index>(motions.size()), motions[0]->poses.cols());
-  for (std::size_t i = 0; i < motions.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = motions[i]->poses.colwise().mean();
+  for (std::size_t i = 0; i < motions.size(); ++i)
+    out.row(static_cast<Eigen::Index>(i)) = motions[i]->poses.colwise().mean();
   return out;
 }
 
 // The pairs of a motion in the group and one outside whose poses are nearest: out of the group, or into it.
-std::vector<std::pair<std::size_t, std::size_t>> nearest_pairs(const Eigen::MatrixXf& ends, const Eigen::MatrixXf& starts,
+std::vector<std::pair<std::size_t, std::size_t>> nearest_pairs(const Eigen::MatrixXf& ends,
+                                                               const Eigen::MatrixXf& starts,
                                                                const std::vector<std::size_t>& component,
                                                                std::size_t group, bool out) {
   std::vector<std::tuple<float, std::size_t, std::size_t>> found;
@@ -101,7 +103,8 @@ std::vector<std::size_t> strong_components(std::size_t nodes, Arrows arrows) {
 
 std::vector<GraphBridge> graph_bridges(const ConnectionSpace& space, std::span<const ConnectionMotion* const> ends,
                                        std::span<const ConnectionMotion* const> starts,
-                                       std::vector<std::pair<std::size_t, std::size_t>> arrows, double largest_cost_cm) {
+                                       std::vector<std::pair<std::size_t, std::size_t>> arrows,
+                                       double largest_cost_cm) {
   std::vector<GraphBridge> out;
   if (ends.empty()) return out;
   const Eigen::MatrixXf end_poses = mean_poses(ends), start_poses = mean_poses(starts);

@@ -60,7 +60,8 @@ std::vector<GraphWay> best_ways(const ConnectionSpace& space, const ConnectionBo
   std::ranges::sort(candidates);
   std::vector<int> tries(std::ranges::max(motions.group) + 1, limits.group_tries);
   for (const GraphWay& candidate : candidates) {
-    const bool for_group = tries[motions.group[candidate.to]] > 0 && candidate.cost_cm <= kept.group_limit(candidate.to);
+    const bool for_group =
+        tries[motions.group[candidate.to]] > 0 && candidate.cost_cm <= kept.group_limit(candidate.to);
     if (!for_group && candidate.cost_cm > kept.limit()) continue;
     --tries[motions.group[candidate.to]];
     const double limit = for_group ? std::max(kept.limit(), kept.group_limit(candidate.to)) : kept.limit();

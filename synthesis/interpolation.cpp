@@ -18,10 +18,11 @@ namespace {
 void require_one_space(LibraryView& library, std::span<const ClipRow> rows) {
   for (const ClipRow& row : rows) {
     if (row.space_id == rows.front().space_id) continue;
-    throw Error(ErrorKind::bad_input, {.file = library.library().path().string(),
-                                       .found = fmt::format("{} and {} of different skeletons", rows.front().name, row.name),
-                                       .expected = "clips of one joint tree",
-                                       .remedy = "`kinespace info LIB` lists the skeletons"});
+    throw Error(ErrorKind::bad_input,
+                {.file = library.library().path().string(),
+                 .found = fmt::format("{} and {} of different skeletons", rows.front().name, row.name),
+                 .expected = "clips of one joint tree",
+                 .remedy = "`kinespace info LIB` lists the skeletons"});
   }
 }
 
@@ -37,7 +38,8 @@ Neighbourhood neighbourhood(LibraryView& library, std::vector<ClipRow> rows, int
   const Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> all(
       matrix.values.data(), count, static_cast<Eigen::Index>(matrix.dimensions));
   std::vector<Eigen::Index> chosen;
-  for (const ClipRow& row : rows) chosen.push_back(std::ranges::find(matrix.clip_ids, row.id) - matrix.clip_ids.begin());
+  for (const ClipRow& row : rows)
+    chosen.push_back(std::ranges::find(matrix.clip_ids, row.id) - matrix.clip_ids.begin());
   const std::size_t given = chosen.size();
   for (std::size_t g = 0; g < given; ++g) {
     const Eigen::VectorXf distance = (all.rowwise() - all.row(chosen[g])).rowwise().squaredNorm();
@@ -98,9 +100,11 @@ void BlendOptions::validate(std::size_t clips) const {
   };
   if (clips == 0) fail("no clips", "one clip or more");
   if (weights) {
-    if (weights->size() != clips) fail(fmt::format("{} weights", weights->size()), fmt::format("one a clip: {}", clips));
+    if (weights->size() != clips)
+      fail(fmt::format("{} weights", weights->size()), fmt::format("one a clip: {}", clips));
     const double sum = std::accumulate(weights->begin(), weights->end(), 0.0);
-    if (!std::isfinite(sum) || std::abs(sum) < 1e-6) fail(fmt::format("weights with the sum {}", sum), "a sum that is not 0");
+    if (!std::isfinite(sum) || std::abs(sum) < 1e-6)
+      fail(fmt::format("weights with the sum {}", sum), "a sum that is not 0");
   }
   if (at && !(*at >= 0 && *at <= static_cast<double>(clips - 1))) {
     fail(fmt::format("at = {}", *at), fmt::format("from 0 (the first clip) to {} (the last)", clips - 1));

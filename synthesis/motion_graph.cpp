@@ -48,9 +48,8 @@ std::vector<std::vector<std::size_t>> nearest_rows(const RetrievalMatrix& matrix
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::erase(order, static_cast<std::size_t>(i));
     const auto keep = std::min(order.size(), static_cast<std::size_t>(neighbours));
-    std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(keep), {}, [&](std::size_t k) {
-      return std::pair(distance(static_cast<Eigen::Index>(k)), k);
-    });
+    std::ranges::partial_sort(order, order.begin() + static_cast<std::ptrdiff_t>(keep), {},
+                              [&](std::size_t k) { return std::pair(distance(static_cast<Eigen::Index>(k)), k); });
     order.resize(keep);
     out[static_cast<std::size_t>(i)] = std::move(order);
   });
@@ -62,8 +61,9 @@ std::vector<std::size_t> nearest_templates(const RetrievalMatrix& matrix, std::s
                                            std::span<const std::int64_t> templates) {
   const auto row_of = [&](std::int64_t id) {
     const auto row = std::ranges::lower_bound(matrix.clip_ids, id) - matrix.clip_ids.begin();
-    return Eigen::Map<const Eigen::VectorXf>(matrix.values.data() + row * static_cast<std::ptrdiff_t>(matrix.dimensions),
-                                             static_cast<Eigen::Index>(matrix.dimensions));
+    return Eigen::Map<const Eigen::VectorXf>(
+        matrix.values.data() + row * static_cast<std::ptrdiff_t>(matrix.dimensions),
+        static_cast<Eigen::Index>(matrix.dimensions));
   };
   std::vector<std::size_t> out;
   for (const std::int64_t clip : clips) {
@@ -82,7 +82,8 @@ std::vector<std::size_t> nearest_templates(const RetrievalMatrix& matrix, std::s
 }
 
 // Clips spread over all clips: farthest first.
-std::vector<std::int64_t> spread_templates(const RetrievalMatrix& matrix, std::span<const std::int64_t> clips, int count) {
+std::vector<std::int64_t> spread_templates(const RetrievalMatrix& matrix, std::span<const std::int64_t> clips,
+                                           int count) {
   Eigen::MatrixXf vectors(static_cast<Eigen::Index>(clips.size()), static_cast<Eigen::Index>(matrix.dimensions));
   for (std::size_t i = 0; i < clips.size(); ++i) {
     const auto row = std::ranges::lower_bound(matrix.clip_ids, clips[i]) - matrix.clip_ids.begin();
@@ -133,8 +134,8 @@ MotionGraph MotionGraph::of(LibraryView& library, std::int64_t space_id, const M
   MotionGraph graph = unpack(*kept, library.library().path().string());
   graph.key_ = key;
   const MotionGraphOptions& had = graph.options_;
-  const bool same = had.connections == options.connections && had.groups == options.groups && had.neighbours == options.neighbours &&
-                    had.largest_cost_cm == options.largest_cost_cm &&
+  const bool same = had.connections == options.connections && had.groups == options.groups &&
+                    had.neighbours == options.neighbours && had.largest_cost_cm == options.largest_cost_cm &&
                     had.connection.window_s == options.connection.window_s &&
                     had.connection.shortest_s == options.connection.shortest_s &&
                     had.connection.functions == options.connection.functions;
@@ -196,9 +197,8 @@ void MotionGraph::take_in(LibraryView& library, std::int64_t space_id, const Pro
     }
   }
   const GraphWayLimits limits{static_cast<std::size_t>(options_.connections), options_.largest_cost_cm};
-  over_all(motions.size(), "connecting motions", progress, [&](std::size_t i) {
-    ways[i] = best_ways(space, bounds, motions, i, std::move(ways[i]), limits);
-  });
+  over_all(motions.size(), "connecting motions", progress,
+           [&](std::size_t i) { ways[i] = best_ways(space, bounds, motions, i, std::move(ways[i]), limits); });
   std::map<std::pair<std::int64_t, std::int64_t>, double> connections;
   for (std::size_t i = 0; i < motions.size(); ++i) {
     for (const GraphWay& way : ways[i]) connections[{clips_[i], clips_[way.to]}] = way.cost_cm;
@@ -230,10 +230,9 @@ void MotionGraph::take_in(LibraryView& library, std::int64_t space_id, const Pro
     ++done;
     const auto kept = known.find({a, b});
     const ClipRow& row = rows[index.at(a)];
-    const double cost = kept != known.end()
-                            ? kept->second
-                            : motion_distance_cm(library.curves(row), library.curves(rows[index.at(b)]),
-                                                 library.skeleton(row.skeleton_id));
+    const double cost = kept != known.end() ? kept->second
+                                            : motion_distance_cm(library.curves(row), library.curves(rows[index.at(b)]),
+                                                                 library.skeleton(row.skeleton_id));
     if (cost > options_.largest_cost_cm) continue;
     arrows_.push_back({a, b, GraphArrow::Kind::neighbour, cost});
     arrows_.push_back({b, a, GraphArrow::Kind::neighbour, cost});

@@ -6,9 +6,9 @@
 // plays, interpolation.h). Kept for each clip are the `connections` best ways out of it, the best way into each of
 // `groups` groups of similar clips (so that far motions are few steps away), and its nearest neighbours, with at most
 // `largest_cost_cm`. Which connections are the best is exact: pairs are tried by their lower bounds (ConnectionBounds)
-// until no other can be better; into a group it is the best of the 4 of lowest bound. Groups of clips that still cannot be left or reached are joined by bridges: the best of
-// the 16 connections between the poses nearest on the average, until all are joined or nothing below the largest cost
-// is left.
+// until no other can be better; into a group it is the best of the 4 of lowest bound. Groups of clips that still cannot
+// be left or reached are joined by bridges: the best of the 16 connections between the poses nearest on the average,
+// until all are joined or nothing below the largest cost is left.
 //
 // The graph is kept in the library file. Clips that were added since are taken in, with the functions that the graph
 // was made with, so that old arrows keep their costs.

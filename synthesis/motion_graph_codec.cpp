@@ -76,9 +76,10 @@ MotionGraph MotionGraph::unpack(std::span<const std::byte> bytes, const std::str
     const auto kind = in.get<std::uint8_t>();
     arrow.kind = kind == 0 ? GraphArrow::Kind::connection : GraphArrow::Kind::neighbour;
     arrow.cost_cm = in.get<double>();
-    const bool known = std::ranges::binary_search(graph.clips_, arrow.from) &&
-                       std::ranges::binary_search(graph.clips_, arrow.to);
-    if (kind > 1 || !known || !(arrow.cost_cm >= 0)) in.fail("an arrow of the motion graph that cannot be", "arrows between its clips");
+    const bool known =
+        std::ranges::binary_search(graph.clips_, arrow.from) && std::ranges::binary_search(graph.clips_, arrow.to);
+    if (kind > 1 || !known || !(arrow.cost_cm >= 0))
+      in.fail("an arrow of the motion graph that cannot be", "arrows between its clips");
     graph.arrows_.push_back(arrow);
   }
   in.expect_end();

@@ -258,8 +258,7 @@ GroundMotion compose(const GroundMotion& outer, const GroundMotion& inner) {
 
 void TransitionOptions::validate() const {
   if (!(largest_ratio > 0)) {
-    throw Error(ErrorKind::usage,
-                {.found = fmt::format("largest_ratio = {}", largest_ratio), .expected = "above 0"});
+    throw Error(ErrorKind::usage, {.found = fmt::format("largest_ratio = {}", largest_ratio), .expected = "above 0"});
   }
 }
 
@@ -303,9 +302,9 @@ Transition make_transition(const ConnectionSpace& space, std::span<const ClipCur
     auto join = smoothest_join(space, space.end_of(clips[i]), space.start_of(clips[i + 1]), sources[i], sources[i + 1],
                                skeleton, options);
     if (!join) {
-      throw Error(ErrorKind::bad_input,
-                  {.found = fmt::format("no way from {} to {} within the legal speeds", clips[i].name, clips[i + 1].name),
-                   .expected = "clips whose ends and starts last at least the smallest overlap"});
+      throw Error(ErrorKind::bad_input, {.found = fmt::format("no way from {} to {} within the legal speeds",
+                                                              clips[i].name, clips[i + 1].name),
+                                         .expected = "clips whose ends and starts last at least the smallest overlap"});
     }
     out.begin.push_back(offsets.back() + join->connection.leave_s);
     offsets.push_back(out.begin.back() + join->duration_s - join->connection.entered_s);
@@ -317,7 +316,9 @@ Transition make_transition(const ConnectionSpace& space, std::span<const ClipCur
   const double end_s = offsets.back() + sources.back().sampler.duration_s();
   constexpr double rounding = 1e-6;  // of a frame
   const int frames = static_cast<int>(std::floor(end_s * rate + rounding)) + 1;
-  ClipCurves curves{.name = clips.front().name, .rate_hz = rate, .placement = clips[0].placement,
+  ClipCurves curves{.name = clips.front().name,
+                    .rate_hz = rate,
+                    .placement = clips[0].placement,
                     .values = SampleMatrix(frames, sources[0].sampler.curves())};
   curves.placement.start_cm.y() = 0;
   std::vector<std::vector<FramePart>> parts;

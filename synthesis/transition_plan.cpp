@@ -53,7 +53,8 @@ std::optional<GraphPath> way_through(LibraryView& library, const std::vector<Cli
   GraphPath out{.clips = {rows.front().id}};
   for (std::size_t i = 0; i + 1 < rows.size(); ++i) {
     auto path = graph.path(rows[i].id, rows[i + 1].id);
-    const auto direct = space.connect(space.end_of(library.curves(rows[i])), space.start_of(library.curves(rows[i + 1])));
+    const auto direct =
+        space.connect(space.end_of(library.curves(rows[i])), space.start_of(library.curves(rows[i + 1])));
     const bool near = direct && direct->cost_cm <= graph.options().largest_cost_cm &&
                       (!path || MotionGraph::weight_of(direct->cost_cm) <= path->weight);
     if (near || (path && path->clips.size() == 1)) {  // one clip after itself is a direct way too

@@ -54,8 +54,8 @@ TEST_F(SynthesisCommands, transition_writes_the_motion_its_picture_and_its_figur
 
 TEST_F(SynthesisCommands, the_way_through_the_graph_is_kept_in_the_library) {
   const auto before = std::filesystem::file_size(library());
-  const auto result = run_command({"transition", library(), "stand_calm_001", "run_fast_001", "--via-graph", "-o",
-                                   out("far.bvh"), "--json"});
+  const auto result = run_command(
+      {"transition", library(), "stand_calm_001", "run_fast_001", "--via-graph", "-o", out("far.bvh"), "--json"});
   ASSERT_EQ(result.code, 0) << result.err;
   const json figures = json::parse(result.out);
   EXPECT_EQ(figures["clips"].front(), "stand_calm_001");
@@ -64,8 +64,8 @@ TEST_F(SynthesisCommands, the_way_through_the_graph_is_kept_in_the_library) {
 }
 
 TEST_F(SynthesisCommands, no_way_is_an_answer_and_writes_nothing) {
-  const auto result = run_command({"transition", library(), "stand_calm_001", "run_fast_001", "--via-graph", "--max-cost",
-                                   "0.001", "-o", out("none.bvh"), "--json"});
+  const auto result = run_command({"transition", library(), "stand_calm_001", "run_fast_001", "--via-graph",
+                                   "--max-cost", "0.001", "-o", out("none.bvh"), "--json"});
   ASSERT_EQ(result.code, 0) << result.err;
   EXPECT_FALSE(json::parse(result.out)["found"]);
   EXPECT_FALSE(std::filesystem::exists(out("none.bvh")));

@@ -106,7 +106,8 @@ TEST_F(Connections, a_motion_cut_in_two_is_joined_where_it_was_cut) {
   const ClipRow row = view_->require_clip("walk_normal_001");
   const Clip whole = view_->clip(row);
   const int half = whole.frames / 2, shared = static_cast<int>(std::lround(whole.rate_hz / 2));
-  auto first = clip_curves(slice(whole, 0, half + shared)), second = clip_curves(slice(whole, half, whole.frames - half));
+  auto first = clip_curves(slice(whole, 0, half + shared)),
+       second = clip_curves(slice(whole, half, whole.frames - half));
   view_->space(row.space_id).apply_references(first.values);
   view_->space(row.space_id).apply_references(second.values);
   const auto found = space_->connect(space_->end_of(first), space_->start_of(second), 0.4);

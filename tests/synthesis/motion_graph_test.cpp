@@ -35,7 +35,8 @@ TEST_F(Graph, the_best_ways_are_those_of_brute_force) {
     for (const std::int64_t to : graph.clips()) {
       if (to == from) continue;
       const auto connection = space.connect(ends[from], starts[to]);
-      if (connection && connection->cost_cm <= graph.options().largest_cost_cm) all.emplace_back(connection->cost_cm, to);
+      if (connection && connection->cost_cm <= graph.options().largest_cost_cm)
+        all.emplace_back(connection->cost_cm, to);
     }
     std::ranges::sort(all);
     all.resize(std::min<std::size_t>(all.size(), 4));

@@ -1,5 +1,3 @@
-#include "synthesis/transition_plan.h"
-
 #include <algorithm>
 #include <cmath>
 
@@ -10,6 +8,7 @@
 #include "motion/kinematics.h"
 #include "synthesis/interpolation.h"
 #include "synthesis/motion_engine.h"
+#include "synthesis/transition_plan.h"
 #include "tests/synthesis/library_folder.h"
 
 namespace kinespace {
