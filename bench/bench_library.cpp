@@ -2,9 +2,8 @@
 
 #include <system_error>
 
-#include <unistd.h>
-
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "fpca/library_builder.h"
 

@@ -3,11 +3,11 @@
 //   kinespace::MotionEngine engine("moves.kspace");
 //   auto near   = engine.nearest(kinespace::read_clip("take.bvh"), {.k = 3});          // what is this like?
 //   auto player = engine.play("walk_normal_001");                                      // pose by pose, any detail
-//   auto root   = player.pose(1.25, 5, rotations);                                     // 5 functions: far from the camera
-//   auto mix    = engine.blend({"walk_slow_001", "walk_fast_001"}, {.weights = {{0.3, 0.7}}});
-//   auto on     = engine.transition({"walk_normal_001", "run_fast_002"});              // one into the other
-//   auto far    = engine.transition({"stand_calm_001", "run_fast_002"}, {.via_graph = true});  // through others
-//   auto whole  = engine.fill(take, {.first_frame = 30, .last_frame = 75});                        // frames that are missing
+//   auto root   = player.pose(1.25, 5, rotations);                                     // 5 functions: far from the
+//   camera auto mix    = engine.blend({"walk_slow_001", "walk_fast_001"}, {.weights = {{0.3, 0.7}}}); auto on     =
+//   engine.transition({"walk_normal_001", "run_fast_002"});              // one into the other auto far    =
+//   engine.transition({"stand_calm_001", "run_fast_002"}, {.via_graph = true});  // through others auto whole  =
+//   engine.fill(take, {.first_frame = 30, .last_frame = 75});                        // frames that are missing
 //   kinespace::write_clip("out.bvh", on->transition.clip);
 //
 // Each call is a thin layer over the header that is named beside it, where its options, errors and results are
@@ -53,7 +53,7 @@ class MotionEngine {
  private:
   LibraryView library_;
   std::map<std::int64_t, std::shared_ptr<const PlaybackBasis>> bases_;  // by space
-  std::map<std::string, FillModel> fill_models_;                       // by joint tree
+  std::map<std::string, FillModel> fill_models_;                        // by joint tree
 };
 
 }  // namespace kinespace

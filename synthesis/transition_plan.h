@@ -32,8 +32,7 @@ struct PlannedTransition {
 // Plays the named clips one after the other. None when the graph has no way between two of them: an answer. Throws
 // Error{usage} for an unknown name, Error{bad_input} for clips of different skeletons and for a clip shorter than twice
 // the smallest overlap.
-[[nodiscard]] std::optional<PlannedTransition> plan_transition(LibraryView& library,
-                                                               std::span<const std::string> clips,
+[[nodiscard]] std::optional<PlannedTransition> plan_transition(LibraryView& library, std::span<const std::string> clips,
                                                                const TransitionPlanOptions& options = {},
                                                                const Progress& progress = {});
 
