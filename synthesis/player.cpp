@@ -40,7 +40,7 @@ struct PoseJob {
   float duration_s = 0;
   const float* travel = nullptr;
   const float* scores = nullptr;
-  const float* velocity_scores = nullptr;
+  std::ptrdiff_t score_stride = 0;
   int joint_lanes = 0;
   int joints = 0;
   CutPart cuts[2];
@@ -80,19 +80,20 @@ KINESPACE_SIMD_BODY void place_root(PoseJob& job) {
   alignas(64) float weights[most_entries];
   place_weights(job, 0, weights);
   const bool shared = job.integrals[1] == job.integrals[0] && job.integrals[2] == job.integrals[0];
+  const float* velocity = job.scores + static_cast<std::ptrdiff_t>(4) * job.joint_lanes;
   Four sum = {};
   if (shared) {
     sum = Four{job.travel[0], job.travel[1], job.travel[2], 0} * job.own + weights[0];
     for (int k = 1; k <= job.functions; ++k) {
       Four x;
-      std::memcpy(&x, job.velocity_scores + static_cast<std::ptrdiff_t>(4) * (k - 1), sizeof(Four));
+      std::memcpy(&x, velocity + (k - 1) * job.score_stride, sizeof(Four));
       sum += weights[k] * x;
     }
   } else {
     for (int axis = 0; axis < 3; ++axis) {
       if (axis > 0) place_weights(job, axis, weights);
       sum[axis] = job.travel[axis] * job.own + weights[0];
-      for (int k = 1; k <= job.functions; ++k) sum[axis] += weights[k] * job.velocity_scores[4 * (k - 1) + axis];
+      for (int k = 1; k <= job.functions; ++k) sum[axis] += weights[k] * velocity[(k - 1) * job.score_stride + axis];
     }
   }
   for (const CutPart& cut : job.cuts) {
@@ -158,10 +159,10 @@ KINESPACE_SIMD_BODY void play_body(PoseJob& job) {
     Vector sum[4];
     for (int q = 0; q < 4; ++q) sum[q] = Vector{} + weight[q][0];
     const float* scores = job.scores + start;
-    for (int k = 1; k < count; ++k) {
-      for (int q = 0; q < 4; ++q, scores += job.joint_lanes) {
+    for (int k = 1; k < count; ++k, scores += job.score_stride) {
+      for (int q = 0; q < 4; ++q) {
         Vector x;
-        std::memcpy(&x, scores, sizeof(Vector));
+        std::memcpy(&x, scores + static_cast<std::ptrdiff_t>(q) * job.joint_lanes, sizeof(Vector));
         sum[q] += weight[q][k] * x;
       }
     }
@@ -210,7 +211,7 @@ PlayerParts::Place PlayerParts::place_in(std::size_t index, double own) const {
     const double x = own * inverse_cells;
     const int i = std::min(static_cast<int>(x), inverse_cells - 1);
     const double t = x - i;
-    const float* p = inverse.data() + sequence.inverse + 2 * i;
+    const float* p = scores.data() + sequence.inverse + 2 * i;
     const double change = static_cast<double>(p[2]) - static_cast<double>(p[0]);
     const double d0 = static_cast<double>(p[1]) / inverse_cells - change;
     const double d1 = change - static_cast<double>(p[3]) / inverse_cells;
@@ -287,6 +288,8 @@ Eigen::Vector3f Player::pose(double time_s, int functions, std::span<float> rota
   const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
   PoseJob job;
   job.functions = parts.level(functions);
+  job.scores = parts.scores.data() + sequence.scores;
+  job.score_stride = static_cast<std::ptrdiff_t>(parts.score_stride());
   job.values_stride = basis.values_stride();
   job.integrals_stride = basis.integrals_stride();
   job.b = place.b;
@@ -300,8 +303,6 @@ Eigen::Vector3f Player::pose(double time_s, int functions, std::span<float> rota
   job.own = static_cast<float>(place.own);
   job.duration_s = sequence.duration_s;
   job.travel = sequence.travel.data();
-  job.scores = parts.scores.data() + sequence.scores;
-  job.velocity_scores = parts.velocity_scores(sequence);
   job.joint_lanes = parts.lanes;
   job.joints = parts.joints;
   add_cut_parts(parts, place, job.functions, job.cuts);
@@ -330,6 +331,7 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
   };
 
   const auto own = static_cast<float>(place.own);
+  const float* scores = parts.scores.data() + sequence.scores;
   float from_start[3];
   for (int axis = 0; axis < 3; ++axis) {
     float sum = own * sequence.travel[static_cast<std::size_t>(axis)];
@@ -340,16 +342,17 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
         weight += sequence.warp[static_cast<std::size_t>(j)] * sequence.duration_s *
                   (integral - own * basis.ends(axis, k / lanes)[j * lanes + k % lanes]);
       }
-      sum += weight * (k == 0 ? 1.0F : parts.velocity_scores(sequence)[4 * (k - 1) + axis]);
+      sum += weight * (k == 0 ? 1.0F
+                              : scores[static_cast<std::size_t>(k - 1) * parts.score_stride() +
+                                       parts.rotation_floats() + static_cast<std::size_t>(axis)]);
     }
     for (const CutPart& cut : cuts) {
       if (cut.correction != nullptr)
-        sum -= cut.slope * cut.correction[2 * parts.score_stride() + static_cast<std::size_t>(axis)];
+        sum -= cut.slope * cut.correction[2 * parts.rotation_floats() + static_cast<std::size_t>(axis)];
     }
     from_start[axis] = sum;
   }
 
-  const float* scores = parts.scores.data() + sequence.scores;
   for (int joint = 0; joint < parts.joints; ++joint) {
     float q[4];
     for (int component = 0; component < 4; ++component) {
@@ -361,7 +364,7 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
       }
       for (const CutPart& cut : cuts) {
         if (cut.correction == nullptr) continue;
-        sum += cut.value * cut.correction[column] - cut.slope * cut.correction[parts.score_stride() + column];
+        sum += cut.value * cut.correction[column] - cut.slope * cut.correction[parts.rotation_floats() + column];
       }
       q[component] = sum;
     }

@@ -35,7 +35,7 @@ class GrowingSequence {
       const PlayerParts::Place place = parts.place_in(sequence, own);
       for (int c = 0; c < basis.curves(); ++c) add_frame(place, c);
     }
-    frames_ = SampleMatrix::Zero(rows, static_cast<Eigen::Index>(parts.score_stride()) + 4);
+    frames_ = SampleMatrix::Zero(rows, static_cast<Eigen::Index>(parts.rotation_floats()) + 4);
     for (int axis = 0; axis < 3; ++axis) {
       for (int f = 0; f < rows; ++f) {
         frames_(f, place_column() + axis) = static_cast<double>(sequence_.travel[static_cast<std::size_t>(axis)]) * f /
@@ -60,14 +60,13 @@ class GrowingSequence {
   [[nodiscard]] const SampleMatrix& frames() const { return frames_; }
 
  private:
-  [[nodiscard]] Eigen::Index place_column() const { return static_cast<Eigen::Index>(parts_.score_stride()); }
+  [[nodiscard]] Eigen::Index place_column() const { return static_cast<Eigen::Index>(parts_.rotation_floats()); }
   [[nodiscard]] Eigen::Index column(int c) const {
     if (c < 3) return place_column() + c;
     return static_cast<Eigen::Index>((c - 3) % 4) * parts_.lanes + (c - 3) / 4;
   }
   [[nodiscard]] float score_of(int c, int k) const {
     const auto row = static_cast<std::size_t>(k - 1);
-    if (c < 3) return parts_.velocity_scores(sequence_)[4 * row + static_cast<std::size_t>(c)];
     return parts_.scores[sequence_.scores + row * parts_.score_stride() + static_cast<std::size_t>(column(c))];
   }
   // The first curve whose weights are those of c.
@@ -139,6 +138,8 @@ PlayerParts::PlayerParts(std::shared_ptr<const PlaybackBasis> basis_in, const En
   if (sequences.empty()) {
     throw Error(ErrorKind::usage, {.file = clip.name, .found = "a clip without sequences", .expected = "one or more"});
   }
+  scores.shrink_to_fit();
+  cuts.shrink_to_fit();
   index_times();
 }
 
@@ -154,23 +155,24 @@ void PlayerParts::add_sequence(const EncodedSequence& encoded, double rate, cons
   }
   for (Eigen::Index axis = 0; axis < 3; ++axis) out.travel[static_cast<std::size_t>(axis)] = encoded.travel(axis);
   if (out.warped) {
-    out.inverse = inverse.size();
+    out.inverse = scores.size();
     for (int i = 0; i <= inverse_cells; ++i) {
       const double s = encoded.warp.space_time(static_cast<double>(i) / inverse_cells);
-      inverse.push_back(static_cast<float>(s));
-      inverse.push_back(static_cast<float>(1 / encoded.warp.slope(s)));
+      scores.push_back(static_cast<float>(s));
+      scores.push_back(static_cast<float>(1 / encoded.warp.slope(s)));
     }
   }
+  scores.resize((scores.size() + PlaybackBasis::lanes - 1) / PlaybackBasis::lanes * PlaybackBasis::lanes, 0.0F);
   out.scores = scores.size();
   const Eigen::Index functions = basis->functions();
-  scores.resize(scores.size() + static_cast<std::size_t>(functions) * score_stride() + velocity_floats(), 0.0F);
+  scores.resize(scores.size() + static_cast<std::size_t>(functions) * score_stride(), 0.0F);
   const Eigen::Index known = std::min(functions, encoded.scores.rows());
-  float* velocity = scores.data() + out.scores + static_cast<std::size_t>(functions) * score_stride();
   for (Eigen::Index k = 0; k < known; ++k) {
-    float* rotation = scores.data() + out.scores + static_cast<std::size_t>(k) * score_stride();
-    for (Eigen::Index axis = 0; axis < 3; ++axis) velocity[4 * k + axis] = encoded.scores(k, axis);
+    float* row = scores.data() + out.scores + static_cast<std::size_t>(k) * score_stride();
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      row[rotation_floats() + static_cast<std::size_t>(axis)] = encoded.scores(k, axis);
     for (Eigen::Index c = 3; c < encoded.scores.cols(); ++c) {
-      rotation[(c - 3) % 4 * lanes + (c - 3) / 4] = encoded.scores(k, c);
+      row[(c - 3) % 4 * lanes + (c - 3) / 4] = encoded.scores(k, c);
     }
   }
   sequences.push_back(out);
@@ -199,7 +201,7 @@ void PlayerParts::add_cuts(std::size_t first, std::size_t last) {
       }
       const CutCorrection correction = cut_correction(left.frames(), right.frames(), options.join.free_change);
       float* out = cuts.data() + sequences[i].cut + level * cut_stride();
-      const auto columns = static_cast<Eigen::Index>(score_stride());
+      const auto columns = static_cast<Eigen::Index>(rotation_floats());
       Eigen::Map<Eigen::RowVectorXf>(out, columns) = correction.value.head(columns).cast<float>();
       // Both neighbours end where the root is: there is no value to correct, only its slope.
       Eigen::Map<Eigen::RowVectorXf>(out + columns, columns + 4) = correction.slope.cast<float>();

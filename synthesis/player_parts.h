@@ -22,8 +22,10 @@ struct PlayerParts {
     std::array<float, PlaybackBasis::warp_terms> warp{};  // a_0 = 1, a_1 .. a_5
     Eigen::Vector3d start = Eigen::Vector3d::Zero();      // metres, in the clip's frame
     std::array<float, 3> travel{};                        // metres
-    std::size_t scores = 0;   // into scores: [function][component w x y z][lane], then [function][4] of the velocity
-    std::size_t inverse = 0;  // into inverse, when warped
+    // Into scores: [function][component w x y z][lane], then four of the velocity, as one row: what a pose reads of a
+    // sequence is one piece of memory.
+    std::size_t scores = 0;
+    std::size_t inverse = 0;  // into scores, before them: value and slope of the warp's inverse at 0, 1/64, .., 1
     std::size_t cut = 0;      // into cuts: the correction where it ends, when joined_after
   };
   struct Place {
@@ -46,24 +48,17 @@ struct PlayerParts {
   float turn_sine = 0;
   std::vector<Sequence> sequences;
   AlignedVector<float> scores;
-  std::vector<float> inverse;  // value and slope of the warp's inverse at 0, 1/64, .., 1
-  AlignedVector<float> cuts;   // [level 0 .. functions][values 4 lanes, slopes 4 lanes, slopes of the root's place 4]
-  int bucket = 1;              // frames
-  std::vector<int> at;         // the sequence at the first frame of each bucket
+  AlignedVector<float> cuts;  // [level 0 .. functions][values 4 lanes, slopes 4 lanes, slopes of the root's place 4]
+  int bucket = 1;             // frames
+  std::vector<int> at;        // the sequence at the first frame of each bucket
 
   PlayerParts(std::shared_ptr<const PlaybackBasis> basis, const EncodedClip& clip, const PlayerOptions& options);
   [[nodiscard]] static const PlayerParts& of(const Player& player) { return *player.parts_; }
 
-  [[nodiscard]] std::size_t score_stride() const { return 4 * static_cast<std::size_t>(lanes); }
-  [[nodiscard]] std::size_t cut_stride() const { return 2 * score_stride() + PlaybackBasis::lanes; }
-  // Of the velocity, four a function; rounded up, so that every sequence begins at a cache line.
-  [[nodiscard]] std::size_t velocity_floats() const {
-    return (4 * static_cast<std::size_t>(basis->functions()) + PlaybackBasis::lanes - 1) / PlaybackBasis::lanes *
-           PlaybackBasis::lanes;
-  }
-  [[nodiscard]] const float* velocity_scores(const Sequence& sequence) const {
-    return scores.data() + sequence.scores + static_cast<std::size_t>(basis->functions()) * score_stride();
-  }
+  // Floats of the rotations in a row, and of all of it: whole cache lines.
+  [[nodiscard]] std::size_t rotation_floats() const { return 4 * static_cast<std::size_t>(lanes); }
+  [[nodiscard]] std::size_t score_stride() const { return rotation_floats() + PlaybackBasis::lanes; }
+  [[nodiscard]] std::size_t cut_stride() const { return 2 * rotation_floats() + PlaybackBasis::lanes; }
   [[nodiscard]] int level(int functions) const {
     return functions < 0 || functions > basis->functions() ? basis->functions() : functions;
   }
