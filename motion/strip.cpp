@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -116,7 +117,7 @@ class Strip {
   [[nodiscard]] double motion_along(const Vector3d& direction) const {
     const std::size_t joints = body_.sides.size();
     double out = 0;
-    for (std::size_t j = 0; j < joints; ++j) {
+    for (auto j = static_cast<std::size_t>(body_.root); j < joints; ++j) {
       double sum = 0;
       double squares = 0;
       for (const Figure& figure : figures_) {
@@ -162,7 +163,8 @@ class Strip {
     double bottom = options_.floor_cm;
     for (const Figure& figure : figures_) {
       const double origin = origin_cm(figure.frame);
-      for (const Vector3d& p : figure.points) {
+      // Joints above the travel root stand at the origin of the file, wherever the body is.
+      for (const Vector3d& p : std::span(figure.points).subspan(static_cast<std::size_t>(body_.root))) {
         low = std::min(low, right_.dot(p) - origin);
         high = std::max(high, right_.dot(p) - origin);
         top = std::max(top, p.y());
@@ -257,7 +259,8 @@ class Strip {
       const double top = margin_px + header_px - 8;
       svg.rectangle({low, top}, {high - low, floor_px_ - top}, "#fdf0c4");
       constexpr double character_px = 5.5;  // of the label's size, about
-      if (character_px * static_cast<double>(band.label.size()) > high - low) continue;  // it would cover its neighbours
+      if (character_px * static_cast<double>(band.label.size()) > high - low)
+        continue;  // it would cover its neighbours
       svg.label({(low + high) / 2, top + 11}, band.label, "middle", 11, "#8a6d00");
     }
   }

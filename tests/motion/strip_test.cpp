@@ -83,6 +83,19 @@ TEST(Strip, puts_a_band_over_its_frames) {
   EXPECT_THAT(svg, HasSubstr(">seam<"));
 }
 
+TEST(Strip, is_as_large_wherever_the_body_stands) {
+  // A joint above the travel root that stays at the origin is no part of the body.
+  Clip near = two_legs(2);
+  for (Joint& joint : near.skeleton.joints) ++joint.parent;
+  near.skeleton.joints[0].channels = {Channel::x_position, Channel::y_position, Channel::z_position};
+  near.skeleton.joints.insert(near.skeleton.joints.begin(), Joint{.name = "origin"});
+  for (auto& track : near.translations) ++track.joint;
+  near.rotations.insert(near.rotations.begin(), near.rotations.begin(), near.rotations.begin() + 4L * near.frames);
+  Clip far = near;
+  for (auto& at : far.translations.front().values) at += Eigen::Vector3d(3000, 0, 2000);
+  EXPECT_EQ(strip_svg(near), strip_svg(far));
+}
+
 TEST(Strip, keeps_the_picture_well_formed_whatever_the_title_holds) {
   const std::string svg = strip_svg(two_legs(0), {.title = "a<b>&\"\x01\xff\xc3\xa4"});
   EXPECT_THAT(svg, HasSubstr(">a&lt;b&gt;&amp;&quot;??\xc3\xa4<"));
