@@ -155,7 +155,6 @@ WindowSynthesis::WindowSynthesis(const MotionSpaceTables& tables, const Skeleton
 void WindowSynthesis::synthesise(const WindowPlace& window, std::span<const double> values, std::span<double> out,
                                  Scratch& scratch) const {
   const auto functions = static_cast<std::size_t>(window.functions);
-  const auto points = static_cast<std::size_t>(window.points);
   const auto dimensions = static_cast<std::size_t>(basis_.rows());
   scratch.coefficients.assign(dimensions * functions, 0.0);
   const double scale = step_ * std::pow(0.5, window.finer / 2) * (window.finer % 2 == 1 ? 0.70710678118654752 : 1.0);
@@ -175,10 +174,8 @@ void WindowSynthesis::synthesise(const WindowPlace& window, std::span<const doub
     return;
   }
   const auto natural = functions_->get(window.points, window.functions);
-  for (std::size_t d = 0; d < dimensions; ++d) {
-    natural->synthesise(std::span(scratch.coefficients).subspan(d * functions, longest),
-                        out.subspan(d * points, points));
-  }
+  natural->synthesise(scratch.coefficients.data(), static_cast<std::ptrdiff_t>(functions), static_cast<int>(longest),
+                      static_cast<int>(dimensions), out.data(), scratch.sums);
 }
 
 }  // namespace kinespace

@@ -75,6 +75,7 @@ class WindowSynthesis {
 
   struct Scratch {
     std::vector<double> coefficients;
+    std::vector<double> sums;
   };
   // values: [component][functions]; out: [dimension][points].
   void synthesise(const WindowPlace& window, std::span<const double> values, std::span<double> out,

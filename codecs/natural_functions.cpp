@@ -5,7 +5,7 @@
 #include <cassert>
 #include <cmath>
 
-#include "motion/simd.h"
+#include "kernels/simd.h"
 
 namespace kinespace {
 namespace {
@@ -63,18 +63,51 @@ void tabulate(int k, int n, std::span<double> out) {
   }
 }
 
-KINESPACE_VECTOR_CLONES void add_four(const double* table, std::ptrdiff_t stride, const double* c, double* sum,
-                                      std::size_t n) {
-  const double* a0 = table;
-  const double* a1 = a0 + stride;
-  const double* a2 = a1 + stride;
-  const double* a3 = a2 + stride;
-  for (std::size_t t = 0; t < n; ++t) sum[t] += ((c[0] * a0[t] + c[2] * a1[t]) + (c[4] * a2[t] + c[6] * a3[t]));
+// Adds to the sums of `Rows` curves, [row][half], every second function from `table` on: four at a time, then single
+// ones. A function's samples are fetched once for all rows; every sum is made in the same order whatever the vectors'
+// width.
+template <int Rows>
+KINESPACE_SIMD_BODY void add_functions(const double* __restrict table, std::ptrdiff_t half, const double* coefficients,
+                                       std::ptrdiff_t stride, int count, double* __restrict sums) {
+  int k = 0;
+  for (; k + 8 <= count + 1; k += 8) {
+    const double* __restrict a0 = table + k * half;
+    const double* __restrict a1 = a0 + 2 * half;
+    const double* __restrict a2 = a1 + 2 * half;
+    const double* __restrict a3 = a2 + 2 * half;
+    for (int r = 0; r < Rows; ++r) {
+      const double* c = coefficients + r * stride + k;
+      const double c0 = c[0], c1 = c[2], c2 = c[4], c3 = c[6];
+      double* __restrict sum = sums + r * half;
+      for (std::ptrdiff_t t = 0; t < half; ++t) sum[t] += (c0 * a0[t] + c1 * a1[t]) + (c2 * a2[t] + c3 * a3[t]);
+    }
+  }
+  for (; k < count; k += 2) {
+    const double* __restrict a = table + k * half;
+    for (int r = 0; r < Rows; ++r) {
+      const double c = coefficients[r * stride + k];
+      double* __restrict sum = sums + r * half;
+      for (std::ptrdiff_t t = 0; t < half; ++t) sum[t] += c * a[t];
+    }
+  }
 }
 
-KINESPACE_VECTOR_CLONES void add_one(const double* a, double c, double* sum, std::size_t n) {
-  for (std::size_t t = 0; t < n; ++t) sum[t] += c * a[t];
+KINESPACE_SIMD_BODY void add_to_one_body(const double* table, std::ptrdiff_t half, const double* coefficients,
+                                         std::ptrdiff_t stride, int count, double* sums) {
+  add_functions<1>(table, half, coefficients, stride, count, sums);
 }
+KINESPACE_SIMD_BODY void add_to_four_body(const double* table, std::ptrdiff_t half, const double* coefficients,
+                                          std::ptrdiff_t stride, int count, double* sums) {
+  add_functions<4>(table, half, coefficients, stride, count, sums);
+}
+KINESPACE_SIMD(add_to_one, void,
+               (const double* table, std::ptrdiff_t half, const double* coefficients, std::ptrdiff_t stride, int count,
+                double* sums),
+               (table, half, coefficients, stride, count, sums))
+KINESPACE_SIMD(add_to_four, void,
+               (const double* table, std::ptrdiff_t half, const double* coefficients, std::ptrdiff_t stride, int count,
+                double* sums),
+               (table, half, coefficients, stride, count, sums))
 
 }  // namespace
 
@@ -141,31 +174,35 @@ std::vector<double> NaturalFunctions::function(int k) const {
 }
 
 void NaturalFunctions::synthesise(std::span<const double> coefficients, std::span<double> out) const {
-  assert(coefficients.size() <= static_cast<std::size_t>(count_) && out.size() == static_cast<std::size_t>(points_));
-  constexpr std::size_t most = 2048;
-  std::array<double, most> odd_stack;
-  std::vector<double> odd_heap;
+  std::vector<double> scratch;
+  synthesise(coefficients.data(), static_cast<std::ptrdiff_t>(coefficients.size()),
+             static_cast<int>(coefficients.size()), 1, out.data(), scratch);
+}
+
+void NaturalFunctions::synthesise(const double* coefficients, std::ptrdiff_t stride, int used, int curves, double* out,
+                                  std::vector<double>& scratch) const {
+  assert(used <= count_);
+  constexpr int at_once = 4;
   const auto half = static_cast<std::size_t>(half_);
-  double* odd = odd_stack.data();
-  if (half > most) {
-    odd_heap.resize(half);
-    odd = odd_heap.data();
+  const auto n = static_cast<std::size_t>(points_);
+  const std::ptrdiff_t h = half_;
+  scratch.resize(2 * at_once * half);
+  for (int first = 0; first < curves;) {
+    const int rows = curves - first >= at_once ? at_once : 1;
+    std::ranges::fill(scratch, 0.0);
+    double* even = scratch.data();
+    double* odd = even + at_once * half;
+    const double* c = coefficients + first * stride;
+    const auto add = rows == at_once ? add_to_four : add_to_one;
+    if (used > 0) add(table_.data(), h, c, stride, used, even);
+    if (used > 1) add(table_.data() + half, h, c + 1, stride, used - 1, odd);
+    for (int r = 0; r < rows; ++r, even += half, odd += half) {
+      double* curve = out + static_cast<std::size_t>(first + r) * n;
+      for (std::size_t t = 0; t < half; ++t) curve[t] = even[t] + odd[t];
+      for (std::size_t t = n - n / 2; t < n; ++t) curve[t] = even[n - 1 - t] - odd[n - 1 - t];
+    }
+    first += rows;
   }
-  double* even = out.data();
-  std::fill_n(even, half, 0.0);
-  std::fill_n(odd, half, 0.0);
-  const auto stride = static_cast<std::ptrdiff_t>(2 * half);
-  std::size_t k = 0;
-  for (; k + 8 <= coefficients.size(); k += 8) {
-    add_four(table_.data() + k * half, stride, coefficients.data() + k, even, half);
-    add_four(table_.data() + (k + 1) * half, stride, coefficients.data() + k + 1, odd, half);
-  }
-  for (; k < coefficients.size(); ++k) {
-    add_one(table_.data() + k * half, coefficients[k], k % 2 == 0 ? even : odd, half);
-  }
-  const std::size_t n = out.size();
-  for (std::size_t t = n - n / 2; t < n; ++t) out[t] = even[n - 1 - t] - odd[n - 1 - t];
-  for (std::size_t t = 0; t < half; ++t) out[t] = even[t] + odd[t];
 }
 
 }  // namespace kinespace

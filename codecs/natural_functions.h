@@ -38,6 +38,11 @@ class NaturalFunctions {
   // Each function is even or odd, so half of the points are summed and mirrored.
   void synthesise(std::span<const double> coefficients, std::span<double> out) const;
 
+  // The same for many curves at once: coefficients [curve][stride], of which the first `used` count; out
+  // [curve][points].
+  void synthesise(const double* coefficients, std::ptrdiff_t stride, int used, int curves, double* out,
+                  std::vector<double>& scratch) const;
+
  private:
   int points_;
   int count_;
