@@ -130,29 +130,10 @@ float cost_of(const AdaptiveBit& model, bool bit) {
   return table[(p + 128) >> 8];
 }
 
-// The models as one row of numbered decisions, for counting.
-template <typename Models, typename Visit>
-void visit_models(Models& models, const Visit& visit) {
-  for (auto& row : models.nonzero) {
-    for (auto& model : row) visit(model);
-  }
-  for (auto& row : models.more) {
-    for (auto& model : row) visit(model);
-  }
-  for (auto& row : models.exponent) {
-    for (auto& model : row) visit(model);
-  }
-  for (auto& model : models.mantissa) visit(model);
-}
-
-constexpr std::size_t model_count = 2 * Spectrum::levels * CoefficientModels::neighbourhoods +
-                                    CoefficientModels::neighbourhoods * CoefficientModels::exponents +
-                                    CoefficientModels::exponents;
-
 class Writer {
  public:
   Writer(const LearnedStart& start, ModelCounts& counts) : models_(start.models()), counts_(counts) {
-    counts_.seen.resize(model_count);
+    counts_.seen.resize(CoefficientModels::count);
   }
 
   // Of a value one, two or more: bits beside the sign.
@@ -199,7 +180,8 @@ class Writer {
   RangeEncoder coder_;
   ModelCounts& counts_;
 };
-static_assert(sizeof(CoefficientModels) == model_count * sizeof(AdaptiveBit), "models are numbered by their address");
+static_assert(sizeof(CoefficientModels) == CoefficientModels::count * sizeof(AdaptiveBit),
+              "models are numbered by their address");
 
 class Reader {
  public:
@@ -261,110 +243,11 @@ std::int64_t choose(double wanted, Context at, double rate_weight, const Writer&
 
 }  // namespace
 
-std::array<int, band_count + 1> band_edges(int functions, int points, double rate_hz) {
-  // Function k stands for k rate / (2 points) Hz: bands begin at 0.35 Hz times powers of sqrt 2.
-  std::array<int, band_count + 1> out{};
-  out[1] = std::min(1, functions);
-  out[2] = std::min(2, functions);
-  double frequency = 0.35;
-  for (std::size_t band = 3; band < band_count; ++band) {
-    const double k = frequency * 2 * points / rate_hz;
-    out[band] = std::clamp(static_cast<int>(std::min(k, 1e6)), out[2], functions);
-    frequency *= 1.4142135623730951;
-  }
-  out[band_count] = functions;
-  return out;
-}
-
-int Spectrum::functions_used(const std::array<int, band_count + 1>& edges) const {
-  int last = 0;
-  for (int c = 0; c < components; ++c) {
-    for (int band = band_count - 1; band >= last; --band) {
-      if (at(c, band) > 0) {
-        last = band + 1;
-        break;
-      }
-    }
-  }
-  return edges[static_cast<std::size_t>(last)];
-}
-
-std::uint8_t Spectrum::level_of(double mean_magnitude) {
-  if (!(mean_magnitude > 0)) return 0;
-  const double level = std::floor(std::log2(mean_magnitude)) + 10;
-  return static_cast<std::uint8_t>(std::clamp(level, 1.0, static_cast<double>(levels - 1)));
-}
-
 double ReconstructionPoints::value(std::int64_t quantised, std::uint8_t level) const {
   if (quantised == 0) return 0;
   const auto magnitude = static_cast<std::size_t>(std::min<std::int64_t>(std::abs(quantised), 3));
   const double size = static_cast<double>(std::abs(quantised)) + shift[level][magnitude - 1] / 64.0;
   return quantised < 0 ? -size : size;
-}
-
-CoefficientModels LearnedStart::models() const {
-  CoefficientModels out;
-  std::size_t i = 0;
-  visit_models(out, [&](AdaptiveBit& model) {
-    const std::uint8_t step = i < steps.size() ? steps[i] : std::uint8_t{0};
-    ++i;
-    if (step == 0) return;
-    // Logistic steps of 1/4 about even odds, by repeated products so that every machine has the same.
-    const int distance = std::abs(static_cast<int>(step) - 32);
-    double odds = 1;
-    for (int k = 0; k < distance; ++k) odds *= 0.7788007830714049;
-    const double p = odds / (1 + odds);
-    model = AdaptiveBit(static_cast<std::uint16_t>(65536 * (step < 32 ? p : 1 - p)), 14);
-  });
-  return out;
-}
-
-void ModelCounts::add(const ModelCounts& other) {
-  seen.resize(model_count);
-  for (std::size_t i = 0; i < other.seen.size(); ++i) {
-    seen[i][0] += other.seen[i][0];
-    seen[i][1] += other.seen[i][1];
-  }
-}
-
-LearnedStart ModelCounts::learn() const {
-  constexpr std::uint32_t enough = 12;  // decisions; fewer do not pay for telling
-  LearnedStart out;
-  for (const auto& [zeros, ones] : seen) {
-    const double odds = (ones + 0.4) / (zeros + 0.4);
-    const double step = std::round(32 + 4 * std::log(odds));
-    out.steps.push_back(zeros + ones < enough ? std::uint8_t{0}
-                                              : static_cast<std::uint8_t>(std::clamp(step, 1.0, 63.0)));
-  }
-  return out;
-}
-
-void CodingStatistics::add(const CodingStatistics& other) {
-  counts.add(other.counts);
-  magnitude.resize(std::max(magnitude.size(), other.magnitude.size()));
-  coefficients.resize(magnitude.size());
-  for (std::size_t i = 0; i < other.magnitude.size(); ++i) {
-    magnitude[i] += other.magnitude[i];
-    coefficients[i] += other.coefficients[i];
-  }
-  for (std::size_t l = 0; l < residual.size(); ++l) {
-    for (std::size_t m = 0; m < 3; ++m) {
-      residual[l][m][0] += other.residual[l][m][0];
-      residual[l][m][1] += other.residual[l][m][1];
-    }
-  }
-  squared_error += other.squared_error;
-}
-
-ReconstructionPoints CodingStatistics::reconstruction() const {
-  ReconstructionPoints out;
-  for (std::size_t l = 0; l < residual.size(); ++l) {
-    for (std::size_t m = 0; m < 3; ++m) {
-      const auto& [sum, count] = residual[l][m];
-      if (count > 0) out.shift[l][m] = static_cast<std::int8_t>(std::clamp(std::round(64 * sum / count), -48.0, 48.0));
-    }
-  }
-  return out;
 }
 
 std::vector<Bytes> encode_group(std::span<CoefficientBlock> blocks, const CoefficientTables& tables, double rate_weight,

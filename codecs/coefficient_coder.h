@@ -54,6 +54,7 @@ struct Spectrum {
 struct CoefficientModels {
   static constexpr int neighbourhoods = 14;
   static constexpr int exponents = 48;
+  static constexpr std::size_t count = 2 * Spectrum::levels * neighbourhoods + neighbourhoods * exponents + exponents;
   std::array<std::array<AdaptiveBit, neighbourhoods>, Spectrum::levels> nonzero;
   std::array<std::array<AdaptiveBit, neighbourhoods>, Spectrum::levels> more;
   std::array<std::array<AdaptiveBit, exponents>, neighbourhoods> exponent;

@@ -74,7 +74,7 @@ class MotionSpaceReader final : public StreamReader {
       const std::size_t from = std::max(begin, group.first);
       const std::size_t to = std::min(end, group.first + group.count);
       if (from >= to) continue;
-      const GroupValues values = decode_values(g, to - group.first, level);
+      const GroupValues values = decode_values(g, level);
       PoseWriter writer(tables_.reference, entry.placement, out);
       for (std::size_t w = from; w < to; ++w) write_window(values, w - group.first, w, decoded_first, writer);
     }
@@ -88,7 +88,7 @@ class MotionSpaceReader final : public StreamReader {
                       [&](std::size_t c) { out[c] = empty_clip(table_.clips[c], 0, table_.clips[c].frames); });
     tbb::parallel_for(std::size_t{0}, layout_.groups.size(), [&](std::size_t g) {
       const WindowGroup& group = layout_.groups[g];
-      const GroupValues values = decode_values(g, group.count, level);
+      const GroupValues values = decode_values(g, level);
       for (std::size_t i = 0; i < group.count; ++i) {
         const auto clip = static_cast<std::size_t>(layout_.windows[group.first + i].clip);
         PoseWriter writer(tables_.reference, table_.clips[clip].placement, out[clip]);
@@ -125,7 +125,7 @@ class MotionSpaceReader final : public StreamReader {
     return out;
   }
 
-  [[nodiscard]] GroupValues decode_values(std::size_t g, std::size_t windows, int level) const {
+  [[nodiscard]] GroupValues decode_values(std::size_t g, int level) const {
     const WindowGroup& group = layout_.groups[g];
     const auto components = static_cast<std::size_t>(tables_.basis.components);
     GroupValues out;
@@ -147,7 +147,6 @@ class MotionSpaceReader final : public StreamReader {
     const std::size_t wanted =
         level < 0 ? layers_[g].size() : std::min(layers_[g].size(), static_cast<std::size_t>(level));
     decode_group(blocks, tables_.coding, std::span(layers_[g]).first(wanted), stream_.source());
-    static_cast<void>(windows);
     return out;
   }
 

@@ -1,0 +1,275 @@
+// One attempt: coding at a step with the windows that are planned.
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+
+#include "codecs/motion_space_encoder.h"
+#include "codecs/registry.h"
+#include "storage/bitstream.h"
+#include "storage/varint.h"
+
+namespace kinespace {
+namespace {
+
+// The basis is sent in steps of 2^-exponent: fine enough that a component of that energy leaks less than a step into
+// the others, and never so coarse that columns of unit length lose their shape.
+constexpr int coarsest_exponent = 5;
+constexpr int extra_exponent = 6;
+constexpr std::size_t windows_at_once = 16;
+constexpr double unlikely = 0.62;  // steps; what is smaller will be coded as zero
+
+using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+double finer_factor(int finer) {
+  return std::pow(2.0, 0.5 * finer);
+}
+
+}  // namespace
+
+// What coding a component takes off the squared error, in squared steps, less what its bits are worth.
+double MotionSpaceEncoder::gain_of(int component, double step, const WindowLayout& layout,
+                                   std::span<const std::size_t> windows) const {
+  constexpr double bits_of_value = 7;
+  constexpr double bits_of_entry = 3;
+  constexpr double worth = 0.12;
+  // A sample of the windows is to pay for its share of the basis.
+  double gain = -worth * bits_of_entry * reference_.dimensions() * static_cast<double>(windows.size()) /
+                static_cast<double>(window_count());
+  for (const std::size_t w : windows) {
+    const std::vector<double>& window = coefficients_[w];
+    const auto points = static_cast<std::size_t>(layout.windows[w].points);
+    const double scale = finer_factor(layout.windows[w].finer) / step;
+    for (std::size_t k = 0; k < points; ++k) {
+      const double size = std::abs(window[static_cast<std::size_t>(component) * points + k]) * scale;
+      if (size > unlikely) gain += size * size - 1.0 / 12 - worth * bits_of_value;
+    }
+  }
+  return gain;
+}
+
+void MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows,
+                                      MotionSpaceTables& tables, Eigen::MatrixXd& mixing) const {
+  const double step = tables.step;
+  const int d = reference_.dimensions();
+  std::vector<double> gains(static_cast<std::size_t>(d));
+  tbb::parallel_for(0, d, [&](int c) { gains[static_cast<std::size_t>(c)] = gain_of(c, step, layout, windows); });
+  std::vector<int> kept;
+  for (int c = 0; c < d; ++c) {
+    if (gains[static_cast<std::size_t>(c)] > 0) kept.push_back(c);
+  }
+  Eigen::MatrixXd basis(d, static_cast<Eigen::Index>(kept.size()));
+  std::vector<int> exponents;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    basis.col(static_cast<Eigen::Index>(i)) = exact_.basis.col(kept[i]);
+    const double rms = std::sqrt(exact_.energy(kept[i]));
+    exponents.push_back(std::max(coarsest_exponent,
+                                 static_cast<int>(std::ceil(std::log2(std::max(rms / step, 1e-3)))) + extra_exponent));
+  }
+  const std::vector<double> rest(static_cast<std::size_t>(d), 0.0);
+  const Eigen::MatrixXd lower =
+      fixed_cholesky(pose_metric(table_.skeletons.front(), reference_, rest).lifted(tables.shell_weight));
+  tables.basis = quantise_basis(lower.transpose() * basis, exponents);
+  const Eigen::MatrixXd sent = solve_transposed(lower, tables.basis.mixing());
+  mixing = projection_onto(sent, metric_) * exact_.basis;
+}
+
+namespace {
+
+// Counts what plain rounding would give, which is where the spectrum starts from.
+void add_plain(std::span<const double> wanted, const WindowPlace& window, double rate_hz, int components,
+               CodingStatistics& sums) {
+  sums.magnitude.resize(static_cast<std::size_t>(components) * band_count);
+  sums.coefficients.resize(sums.magnitude.size());
+  const auto edges = band_edges(window.points, window.points, rate_hz);
+  for (int c = 0; c < components; ++c) {
+    const auto row = wanted.subspan(static_cast<std::size_t>(c) * static_cast<std::size_t>(window.points),
+                                    static_cast<std::size_t>(window.points));
+    for (std::size_t band = 0; band < band_count; ++band) {
+      const std::size_t cell = static_cast<std::size_t>(c) * band_count + band;
+      for (int k = edges[band]; k < edges[band + 1]; ++k) {
+        const double size = std::abs(row[static_cast<std::size_t>(k)]);
+        if (size > unlikely) sums.magnitude[cell] += std::floor(size + 0.5);
+      }
+      sums.coefficients[cell] += edges[band + 1] - edges[band];
+    }
+  }
+}
+
+}  // namespace
+
+// The state of one attempt.
+struct MotionSpaceEncoder::Coding {
+  Attempt attempt;
+  std::vector<std::vector<double>> wanted;   // by window, [component][function], in steps
+  std::vector<CodingStatistics> statistics;  // by group
+  std::vector<ClipErrorSums> errors;
+
+  [[nodiscard]] CodingStatistics total() const {
+    CodingStatistics out;
+    for (const CodingStatistics& one : statistics) out.add(one);
+    return out;
+  }
+};
+
+namespace {
+
+Spectrum spectrum_of(const CodingStatistics& statistics, int components) {
+  Spectrum out{.components = components, .level = {}};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(components) * band_count; ++i) {
+    const double count = i < statistics.coefficients.size() ? statistics.coefficients[i] : 0;
+    out.level.push_back(count > 0 ? Spectrum::level_of(statistics.magnitude[i] / count) : std::uint8_t{0});
+  }
+  return out;
+}
+
+}  // namespace
+
+void MotionSpaceEncoder::code_groups(Coding& coding, const MotionSpaceSettings& settings, bool measure) const {
+  Attempt& a = coding.attempt;
+  const auto components = static_cast<std::size_t>(a.tables.basis.components);
+  a.layout = lay_out(a.clips, a.tables.coding.spectrum, a.tables.group_frames);
+  a.groups.assign(a.layout.groups.size(), {});
+  a.largest.assign(a.layout.windows.size(), 0.0);
+  coding.statistics.assign(a.layout.groups.size(), {});
+  coding.errors.assign(a.layout.groups.size(), {});
+  const WindowSynthesis synthesis(a.tables, table_.skeletons.front());
+  tbb::parallel_for(std::size_t{0}, a.layout.groups.size(), [&](std::size_t g) {
+    if (g % static_cast<std::size_t>(settings.sample) != 0) return;
+    progress_.check_stop();
+    const WindowGroup& group = a.layout.groups[g];
+    std::vector<std::vector<double>> wanted(group.count), values(group.count);
+    std::vector<CoefficientBlock> blocks;
+    for (std::size_t i = 0; i < group.count; ++i) {
+      const WindowPlace& window = a.layout.windows[group.first + i];
+      const auto functions = static_cast<std::size_t>(window.functions);
+      const auto points = static_cast<std::size_t>(window.points);
+      wanted[i].resize(components * functions);
+      values[i].assign(components * functions, 0.0);
+      for (std::size_t c = 0; c < components; ++c) {
+        std::copy_n(coding.wanted[group.first + i].begin() + static_cast<std::ptrdiff_t>(c * points), functions,
+                    wanted[i].begin() + static_cast<std::ptrdiff_t>(c * functions));
+      }
+      blocks.push_back({window.functions, window.edges, window.follows, wanted[i], values[i]});
+    }
+    a.groups[g] = encode_group(blocks, a.tables.coding, settings.rate_weight, coding.statistics[g]);
+    if (!measure) return;
+    WindowSynthesis::Scratch scratch;
+    std::vector<double> vectors;
+    for (std::size_t i = 0; i < group.count; ++i) {
+      const WindowPlace& window = a.layout.windows[group.first + i];
+      const auto c = static_cast<std::size_t>(window.clip);
+      vectors.resize(static_cast<std::size_t>(reference_.dimensions()) * static_cast<std::size_t>(window.points));
+      synthesis.synthesise(window, values[i], vectors, scratch);
+      Clip decoded = slice(clips_[c], window.first, window.points);
+      PoseWriter(reference_, a.clips.clips[c].placement, decoded).write(vectors, 0, window.points);
+      const ClipErrorSums error = clip_error(clips_[c], decoded, window.first, window.points, 0);
+      coding.errors[g].add(error);
+      a.largest[group.first + i] = error.largest;
+    }
+  });
+  a.error = {};
+  for (const ClipErrorSums& error : coding.errors) a.error.add(error);
+}
+
+void MotionSpaceEncoder::scale(std::size_t w, const WindowPlace& window, const Eigen::MatrixXd& mixing,
+                               std::vector<double>& wanted) const {
+  wanted.resize(static_cast<std::size_t>(mixing.rows()) * static_cast<std::size_t>(window.points));
+  Eigen::Map<RowMatrix>(wanted.data(), mixing.rows(), window.points).noalias() =
+      (finer_factor(window.finer) * mixing) *
+      Eigen::Map<const RowMatrix>(coefficients_[w].data(), reference_.dimensions(), window.points);
+}
+
+Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& settings, const Attempt* learned,
+                                    std::span<const int> finer) const {
+  Coding coding;
+  Attempt& a = coding.attempt;
+  a.clips = table_;
+  a.tables.step = step;
+  a.tables.shell_weight = settings.shell_weight;
+  a.tables.group_frames = settings.group_frames;
+  a.tables.reference = reference_;
+  for (std::size_t c = 0; c < clips_.size() && !finer.empty(); ++c) {
+    for (std::size_t b = 0; b < a.clips.clips[c].blocks.size(); ++b)
+      a.clips.clips[c].finer[b] = finer[first_window_[c] + b];
+  }
+  Eigen::MatrixXd mixing;
+  a.layout = lay_out(a.clips, {}, settings.group_frames);
+  std::vector<std::size_t> windows;  // that are coded
+  for (std::size_t g = 0; g < a.layout.groups.size(); g += static_cast<std::size_t>(settings.sample)) {
+    for (std::size_t i = 0; i < a.layout.groups[g].count; ++i) windows.push_back(a.layout.groups[g].first + i);
+  }
+  choose_basis(a.layout, windows, a.tables, mixing);
+  const int components = a.tables.basis.components;
+
+  // Scaled coefficients, and what the spectrum of their plain rounding is.
+  coding.wanted.resize(coefficients_.size());
+  std::vector<CodingStatistics> plain((windows.size() + windows_at_once - 1) / windows_at_once);
+  tbb::parallel_for(std::size_t{0}, plain.size(), [&](std::size_t part) {
+    const std::size_t end = std::min(windows.size(), (part + 1) * windows_at_once);
+    for (std::size_t i = part * windows_at_once; i < end; ++i) {
+      const std::size_t w = windows[i];
+      const WindowPlace& window = a.layout.windows[w];
+      scale(w, window, mixing / step, coding.wanted[w]);
+      add_plain(coding.wanted[w], window, a.clips.clips[static_cast<std::size_t>(window.clip)].rate_hz, components,
+                plain[part]);
+    }
+  });
+  CodingStatistics first;
+  for (const CodingStatistics& one : plain) first.add(one);
+  a.tables.coding.spectrum = spectrum_of(first, components);
+  if (learned != nullptr) {
+    a.tables.coding.start = learned->tables.coding.start;
+    a.tables.coding.points = learned->tables.coding.points;
+  }
+  const bool estimate = settings.sample > 1;
+  code_groups(coding, settings, estimate);
+  CodingStatistics total = coding.total();
+  if (!estimate) {
+    // Once more with what was learned.
+    a.tables.coding.spectrum = spectrum_of(total, components);
+    a.tables.coding.start = total.counts.learn();
+    a.tables.coding.points = total.reconstruction();
+    code_groups(coding, settings, true);
+  } else {
+    a.tables.coding.start = total.counts.learn();
+    a.tables.coding.points = total.reconstruction();
+  }
+  return std::move(coding.attempt);
+}
+
+ClipErrorSums MotionSpaceEncoder::error_of(std::span<const Clip> decoded) const {
+  std::vector<ClipErrorSums> parts(clips_.size());
+  tbb::parallel_for(std::size_t{0}, clips_.size(),
+                    [&](std::size_t c) { parts[c] = clip_error(clips_[c], decoded[c], 0, clips_[c].frames, 0); });
+  ClipErrorSums out;
+  for (const ClipErrorSums& part : parts) out.add(part);
+  return out;
+}
+
+Bytes write_stream(const Attempt& attempt, const MeasuredError& error) {
+  BitstreamWriter out(stream_kind("motion-space"));
+  out.set_error(error);
+  const Bytes clips = pack_clip_table(attempt.clips);
+  const Bytes tables = pack_motion_space_tables(attempt.tables);
+  std::vector<Bytes> layers;
+  std::size_t size = clips.size() + tables.size();
+  for (std::size_t layer = 0; layer < layer_count; ++layer) {
+    ByteWriter block;
+    for (const auto& group : attempt.groups) put_varint(block, group[layer].size());
+    for (const auto& group : attempt.groups) block.put_bytes(group[layer]);
+    layers.push_back(std::move(block).take());
+    size += layers.back().size();
+  }
+  out.add_section("clips", clips);
+  out.add_section("tables", tables);
+  // A reader believes so many frames of so many bytes; motion that never moves has to make up for it.
+  const std::int64_t needed = (attempt.clips.frames() - 65536 + 255) / 256;
+  if (needed > static_cast<std::int64_t>(size)) {
+    out.add_section("padding", Bytes(static_cast<std::size_t>(needed) - size, std::byte{0}));
+  }
+  out.add_progressive_section("layers", layers);
+  return out.finish();
+}
+
+}  // namespace kinespace
