@@ -64,7 +64,7 @@ void connection_rows(const std::string& data, LibraryView& view, BenchReport& re
     seconds = std::min(seconds, std::chrono::duration<double>(Clock::now() - start).count());
   }
   tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t i) {
-    wanted[i] = reference::connect(space, ends.ends[pairs[i].first], ends.starts[pairs[i].second], 65, 240);
+    wanted[i] = reference::connect(space, ends.ends[pairs[i].first], ends.starts[pairs[i].second], 49, 160);
   });
   int agreeing = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {

@@ -4,7 +4,7 @@
 // function, its heading and ground position taken from the frame before the gap. The library's windows whose seen
 // part is nearest (poses and their change over 0.1 s, frames at the gap first) are weighted by a Gauss kernel and give
 // a mean mu and principal components Phi, found by their Gram matrix: far fewer windows than dimensions. What these
-// leave open, r, is a Gaussian process in time (Matern 3/2, length 1 s) that hits what is seen at the edges, so that
+// leave open, r, is a Gaussian process in time (Matern 3/2, length 0.8 s) that hits what is seen at the edges, so that
 // nothing jumps, in place or in speed. With y = mu + Phi z + r, z normal, and V = cov(r) over the seen frames o,
 //
 //   z   = (I + Phi_o' V^-1 Phi_o)^-1 Phi_o' V^-1 (y_o - mu_o)                    (conditional expectation)
@@ -43,7 +43,7 @@ struct FillOptions {
   int far_windows = 200;      // near_windows to 1000: of the estimate from many
   bool own_frames = true;     // windows of the clip itself, outside its gaps, count as the library's
   double max_gap_s = 4;       // 0.1 to 20: longer gaps are refused
-  int calibration_gaps = 64;  // 0 to 2000: gaps filled at each of a few lengths to learn how large errors are; 0: the
+  int calibration_gaps = 96;  // 0 to 2000: gaps filled at each of a few lengths to learn how large errors are; 0: the
                               // uncertainty is the model's own and too large or too small
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;

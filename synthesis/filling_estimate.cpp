@@ -66,7 +66,6 @@ WindowEstimate estimate_window(const FeatureMatrix& members, std::span<const dou
   std::vector<int> u;
   for (int r = 0; r < shape.frames(); ++r) (shape.seen(r) ? o : u).push_back(r);
   const Bridge bridge = bridge_of(o, u, prior);
-  const auto lower = bridge.seen_factor.triangularView<Eigen::Lower>();
 
   const Index curves = seen.cols();
   const auto count = std::min<Index>(prior.windows, members.rows());
@@ -75,35 +74,44 @@ WindowEstimate estimate_window(const FeatureMatrix& members, std::span<const dou
   const Eigen::Map<const SampleMatrix> mean(mean_row.data(), shape.frames(), curves);
 
   // What each window differs from the mean: whitened where seen, and in the gap less what the bridge would put there.
+  // Single precision is enough: rounding is far below the identity that the Gram matrix is added to.
   const auto n_o = static_cast<Index>(o.size());
   const auto n_u = static_cast<Index>(u.size());
-  SampleMatrix whitened(count, n_o * curves);
-  SampleMatrix beyond(count, n_u * curves);
-  SampleMatrix difference(shape.frames(), curves);
+  const Eigen::MatrixXf gain = bridge.gain.cast<float>();
+  const Eigen::MatrixXf seen_factor = bridge.seen_factor.cast<float>();
+  const Eigen::RowVectorXf mean_float = mean_row.cast<float>();
+  FeatureMatrix whitened(count, n_o * curves);
+  FeatureMatrix beyond(count, n_u * curves);
+  FeatureMatrix difference(shape.frames(), curves);
   for (Index k = 0; k < count; ++k) {
-    const Eigen::RowVectorXd row = (members.row(k).cast<double>() - mean_row) * std::sqrt(weight(k));
-    difference = Eigen::Map<const SampleMatrix>(row.data(), shape.frames(), curves);
-    SampleMatrix part = difference(o, Eigen::all);
-    Eigen::Map<SampleMatrix>(beyond.row(k).data(), n_u, curves) = difference(u, Eigen::all) - bridge.gain * part;
-    lower.solveInPlace(part);
-    Eigen::Map<SampleMatrix>(whitened.row(k).data(), n_o, curves) = part;
+    Eigen::Map<Eigen::RowVectorXf>(difference.data(), difference.size()) =
+        (members.row(k) - mean_float) * static_cast<float>(std::sqrt(weight(k)));
+    FeatureMatrix part = difference(o, Eigen::all);
+    Eigen::Map<FeatureMatrix>(beyond.row(k).data(), n_u, curves) = difference(u, Eigen::all) - gain * part;
+    seen_factor.triangularView<Eigen::Lower>().solveInPlace(part);
+    Eigen::Map<FeatureMatrix>(whitened.row(k).data(), n_o, curves) = part;
   }
   SampleMatrix misfit = seen(o, Eigen::all) - mean(o, Eigen::all);
   SampleMatrix estimate = mean(u, Eigen::all) + bridge.gain * misfit;
-  lower.solveInPlace(misfit);
+  bridge.seen_factor.triangularView<Eigen::Lower>().solveInPlace(misfit);
 
-  MatrixXd precision = MatrixXd::Identity(count, count);
-  precision.selfadjointView<Eigen::Lower>().rankUpdate(whitened);
+  Eigen::MatrixXf gram = Eigen::MatrixXf::Zero(count, count);
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(whitened);
+  MatrixXd precision = gram.cast<double>();
+  precision.diagonal().array() += 1;
   const Eigen::LLT<MatrixXd> factor(precision.selfadjointView<Eigen::Lower>());
-  const VectorXd scores = factor.solve(whitened * Eigen::Map<const VectorXd>(misfit.data(), misfit.size()));
-  Eigen::Map<Eigen::RowVectorXd>(estimate.data(), estimate.size()) += scores.transpose() * beyond;
+  const Eigen::VectorXf shown =
+      whitened * Eigen::Map<const Eigen::VectorXd>(misfit.data(), misfit.size()).cast<float>();
+  const VectorXd scores = factor.solve(shown.cast<double>());
+  const Eigen::RowVectorXf change = scores.transpose().cast<float>() * beyond;
+  Eigen::Map<Eigen::RowVectorXd>(estimate.data(), estimate.size()) += change.cast<double>();
 
   WindowEstimate out{.mean = std::move(estimate), .modes = {}, .open_variance = {}};
   const Eigen::MatrixXf lower_factor = MatrixXd(factor.matrixL()).cast<float>();
   out.open_variance.resize(static_cast<Index>(spread_rows.size()));
   for (std::size_t i = 0; i < spread_rows.size(); ++i) {
     // cov z = L^-T L^-1: with E what the windows do in this row, the rows of L^-1 E are the modes.
-    Eigen::MatrixXf modes = beyond.middleCols(spread_rows[i] * curves, curves).cast<float>();
+    Eigen::MatrixXf modes = beyond.middleCols(spread_rows[i] * curves, curves);
     lower_factor.triangularView<Eigen::Lower>().solveInPlace(modes);
     out.modes.emplace_back(modes.transpose());
     out.open_variance(static_cast<Index>(i)) = bridge.open(spread_rows[i]);
