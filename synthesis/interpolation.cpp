@@ -10,21 +10,11 @@
 #include "base/error.h"
 #include "motion/kinematics.h"
 #include "synthesis/curve_sampler.h"
+#include "synthesis/library_clips.h"
 #include "synthesis/time_alignment.h"
 
 namespace kinespace {
 namespace {
-
-void require_one_space(LibraryView& library, std::span<const ClipRow> rows) {
-  for (const ClipRow& row : rows) {
-    if (row.space_id == rows.front().space_id) continue;
-    throw Error(ErrorKind::bad_input,
-                {.file = library.library().path().string(),
-                 .found = fmt::format("{} and {} of different skeletons", rows.front().name, row.name),
-                 .expected = "clips of one joint tree",
-                 .remedy = "`kinespace info LIB` lists the skeletons"});
-  }
-}
 
 // The clips to blend, then the library's clips that are among the k nearest of any of them.
 struct Neighbourhood {
@@ -114,9 +104,7 @@ void BlendOptions::validate(std::size_t clips) const {
 
 Blend make_blend(LibraryView& library, std::span<const std::string> clips, const BlendOptions& options) {
   options.validate(clips.size());
-  std::vector<ClipRow> rows;
-  for (const std::string& name : clips) rows.push_back(library.require_clip(name));
-  require_one_space(library, rows);
+  std::vector<ClipRow> rows = clips_of_one_tree(library, clips);
   const Skeleton& skeleton = library.skeleton(rows.front().skeleton_id);
 
   WeightCurve weights;

@@ -6,25 +6,12 @@
 
 #include "base/error.h"
 #include "synthesis/interpolation.h"
+#include "synthesis/library_clips.h"
 
 namespace kinespace {
 namespace {
 
 using Kind = GraphArrow::Kind;
-
-std::vector<ClipRow> rows_of(LibraryView& library, std::span<const std::string> names) {
-  std::vector<ClipRow> rows;
-  for (const std::string& name : names) rows.push_back(library.require_clip(name));
-  for (const ClipRow& row : rows) {
-    if (row.space_id == rows.front().space_id) continue;
-    throw Error(ErrorKind::bad_input,
-                {.file = library.library().path().string(),
-                 .found = fmt::format("{} and {} of different skeletons", rows.front().name, row.name),
-                 .expected = "clips of one joint tree",
-                 .remedy = "`kinespace info LIB` lists the skeletons"});
-  }
-  return rows;
-}
 
 void require_length(const LibraryView& library, const ClipRow& row, double shortest_s) {
   const double duration = static_cast<double>(row.frames - 1) / row.rate_hz;
@@ -97,7 +84,7 @@ std::optional<PlannedTransition> plan_transition(LibraryView& library, std::span
   if (clips.size() < 2) {
     throw Error(ErrorKind::usage, {.found = fmt::format("{} clip", clips.size()), .expected = "two clips or more"});
   }
-  const std::vector<ClipRow> rows = rows_of(library, clips);
+  const std::vector<ClipRow> rows = clips_of_one_tree(library, clips);
   for (const ClipRow& row : rows) require_length(library, row, options.graph.connection.shortest_s);
   const MotionSpace& motions = library.space(rows.front().space_id);
   const Skeleton& skeleton = library.skeleton(rows.front().skeleton_id);

@@ -1,0 +1,23 @@
+#include "synthesis/library_clips.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+
+namespace kinespace {
+
+std::vector<ClipRow> clips_of_one_tree(const LibraryView& library, std::span<const std::string> names) {
+  std::vector<ClipRow> rows;
+  for (const std::string& name : names) rows.push_back(library.require_clip(name));
+  for (const ClipRow& row : rows) {
+    if (row.space_id == rows.front().space_id) continue;
+    throw Error(ErrorKind::bad_input,
+                {.file = library.library().path().string(),
+                 .found = fmt::format("{} and {} of different skeletons", rows.front().name, row.name),
+                 .expected = "clips of one joint tree",
+                 .remedy = "`kinespace info LIB` lists the skeletons"});
+  }
+  return rows;
+}
+
+}  // namespace kinespace
