@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -68,6 +69,15 @@ std::vector<FrameRange> found_gaps(const Clip& clip, const FillCommandOptions& o
   return out;
 }
 
+// Without calibrating for gaps longer than those there are.
+FillOptions options_for(const std::vector<FrameRange>& gaps, const Clip& clip, FillOptions options) {
+  options.validate();
+  double longest_s = 0.1;
+  for (const FrameRange& gap : gaps) longest_s = std::max(longest_s, gap.count() / clip.rate_hz);
+  options.max_gap_s = std::min(options.max_gap_s, longest_s);
+  return options;
+}
+
 Json to_json(const FilledGap& gap, double rate_hz) {
   return {{"from_s", gap.frames.first_frame / rate_hz},
           {"to_s", gap.frames.last_frame / rate_hz},
@@ -119,7 +129,8 @@ void run_fill(const FillCommandOptions& options, Session& session) {
   const std::vector<FrameRange> gaps = options.from_s ? std::vector{asked_gap(clip, *options.from_s, *options.to_s)}
                                                       : found_gaps(clip, options, session);
   require_fillable(clip, gaps);
-  const FillModel model = FillModel::build(library, clip.skeleton, options.fill, session.progress());
+  const FillModel model =
+      FillModel::build(library, clip.skeleton, options_for(gaps, clip, options.fill), session.progress());
   session.finish_progress();
   const FillResult result = fill(model, clip, gaps);
   Session::check_stop();

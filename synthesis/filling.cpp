@@ -103,7 +103,7 @@ Clip side_by_side(const Clip& a, const Clip& b, int gap) {
 }  // namespace
 
 void FillOptions::validate() const {
-  require("FillOptions.context_s", context_s, 0.1, 2.0);
+  require("FillOptions.context_s", context_s, 0.05, 2.0);
   require("FillOptions.near_windows", near_windows, 4, 200);
   require("FillOptions.far_windows", far_windows, near_windows, 1000);
   require("FillOptions.max_gap_s", max_gap_s, 0.1, 20.0);

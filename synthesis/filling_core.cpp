@@ -11,8 +11,8 @@ namespace {
 using Eigen::Index;
 using Eigen::Vector3d;
 
-constexpr WindowPrior near_prior{.windows = 20, .scale_m = 0.3};
-constexpr WindowPrior far_prior{.windows = 200, .scale_m = 0.1};
+constexpr WindowPrior near_prior{.scale_m = 0.3};
+constexpr WindowPrior far_prior{.scale_m = 0.1};
 
 // d positions (cm) / d features at one row: [3 joint + axis][curve].
 Eigen::MatrixXd position_slopes(const FillLibrary& library, const Eigen::RowVectorXd& row) {

@@ -16,7 +16,7 @@ namespace {
 constexpr double least_weight_m = 0.02;  // joints that nothing hangs on (hands, toes) turn visibly too
 constexpr int index_axes = 24;           // 99 % of the variance of poses and more
 constexpr int row_step = 3;              // frames between the rows that are compared: 0.1 s
-constexpr double fade_s = 0.2;           // rows count less the further they are from the gap
+constexpr double fade_s = 0.12;          // rows count less the further they are from the gap
 constexpr float change_weight = 10;      // of the change from row to row against the row itself
 constexpr int most_windows = 70000;      // beyond, every second, third, .. start is looked at
 

@@ -62,7 +62,7 @@ class FillLibrary {
   void window(const FillTrack& track, int start, const WindowShape& shape, Eigen::Ref<FeatureMatrix> out) const;
 
   struct Search {
-    int count = 200;
+    int count = 300;
     int without = -1;                    // a track of the library that does not count
     bool free_placement = false;         // where the part after the gap is does not count, only what it looks like
     std::span<const FillTrack> extra{};  // more tracks
