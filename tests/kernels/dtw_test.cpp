@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "tests/kernels/dtw_support.h"
+#include "tests/kernels/opencl_device.h"
 
 namespace kinespace {
 namespace {
