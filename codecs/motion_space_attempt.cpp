@@ -27,36 +27,57 @@ double finer_factor(int finer) {
 
 }  // namespace
 
-// What coding a component takes off the squared error, in squared steps, less what its bits are worth.
-double MotionSpaceEncoder::gain_of(int component, double step, const WindowLayout& layout,
-                                   std::span<const std::size_t> windows) const {
+// The functions of a window up to the last whose coefficients, all components together, are not sure to be coded as
+// zero: of recordings at 120 Hz a quarter or less.
+int MotionSpaceEncoder::active_functions(std::size_t window, double step) const {
+  const std::vector<double>& energy = energies_[window];
+  std::size_t n = energy.size();
+  while (n > 0 && energy[n - 1] < 0.25 * step * step) --n;
+  return static_cast<int>(n);
+}
+
+// What coding each component takes off the squared error, in squared steps, less what its bits are worth.
+Eigen::VectorXd MotionSpaceEncoder::gains(double step, const WindowLayout& layout,
+                                          std::span<const std::size_t> windows) const {
   constexpr double bits_of_value = 7;
   constexpr double bits_of_entry = 3;
   constexpr double worth = 0.12;
+  const Eigen::Index d = reference_.dimensions();
+  const RowMatrix analysis = exact_.basis.transpose() * metric_ / step;  // B' M B = I
   // A sample of the windows is to pay for its share of the basis.
-  double gain = -worth * bits_of_entry * reference_.dimensions() * static_cast<double>(windows.size()) /
-                static_cast<double>(window_count());
-  for (const std::size_t w : windows) {
-    const std::vector<double>& window = coefficients_[w];
-    const auto points = static_cast<std::size_t>(layout.windows[w].points);
-    const double scale = finer_factor(layout.windows[w].finer) / step;
-    for (std::size_t k = 0; k < points; ++k) {
-      const double size = std::abs(window[static_cast<std::size_t>(component) * points + k]) * scale;
-      if (size > unlikely) gain += size * size - 1.0 / 12 - worth * bits_of_value;
+  const double price = worth * bits_of_entry * static_cast<double>(d) * static_cast<double>(windows.size()) /
+                       static_cast<double>(window_count());
+  std::vector<Eigen::VectorXd> parts((windows.size() + windows_at_once - 1) / windows_at_once);
+  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t part) {
+    parts[part] = Eigen::VectorXd::Zero(d);
+    const std::size_t end = std::min(windows.size(), (part + 1) * windows_at_once);
+    for (std::size_t i = part * windows_at_once; i < end; ++i) {
+      const std::size_t w = windows[i];
+      const double finer = finer_factor(layout.windows[w].finer);
+      const Eigen::Map<const RowMatrix> all(coefficients_[w].data(), d, layout.windows[w].points);
+      const RowMatrix z = (finer * analysis) * all.leftCols(active_functions(w, step / finer));
+      for (Eigen::Index c = 0; c < d; ++c) {
+        for (Eigen::Index k = 0; k < z.cols(); ++k) {
+          const double square = z(c, k) * z(c, k);
+          if (square > unlikely * unlikely) parts[part](c) += square - 1.0 / 12 - worth * bits_of_value;
+        }
+      }
     }
-  }
-  return gain;
+  });
+  Eigen::VectorXd out = Eigen::VectorXd::Constant(d, -price);
+  for (const Eigen::VectorXd& part : parts) out += part;
+  return out;
 }
 
-void MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows,
-                                      MotionSpaceTables& tables, Eigen::MatrixXd& mixing) const {
+// Returns the projection of pose vectors onto the basis that is sent.
+Eigen::MatrixXd MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows,
+                                                 MotionSpaceTables& tables) const {
   const double step = tables.step;
   const int d = reference_.dimensions();
-  std::vector<double> gains(static_cast<std::size_t>(d));
-  tbb::parallel_for(0, d, [&](int c) { gains[static_cast<std::size_t>(c)] = gain_of(c, step, layout, windows); });
+  const Eigen::VectorXd gain = gains(step, layout, windows);
   std::vector<int> kept;
   for (int c = 0; c < d; ++c) {
-    if (gains[static_cast<std::size_t>(c)] > 0) kept.push_back(c);
+    if (gain(c) > 0) kept.push_back(c);
   }
   Eigen::MatrixXd basis(d, static_cast<Eigen::Index>(kept.size()));
   std::vector<int> exponents;
@@ -71,23 +92,23 @@ void MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std::span<cons
       fixed_cholesky(pose_metric(table_.skeletons.front(), reference_, rest).lifted(tables.shell_weight));
   tables.basis = quantise_basis(lower.transpose() * basis, exponents);
   const Eigen::MatrixXd sent = solve_transposed(lower, tables.basis.mixing());
-  mixing = projection_onto(sent, metric_) * exact_.basis;
+  return projection_onto(sent, metric_);
 }
 
 namespace {
 
-// Counts what plain rounding would give, which is where the spectrum starts from.
-void add_plain(std::span<const double> wanted, const WindowPlace& window, double rate_hz, int components,
+// Counts what plain rounding would give, which is where the spectrum starts from. `wanted`: [component][functions].
+void add_plain(std::span<const double> wanted, int functions, const WindowPlace& window, double rate_hz, int components,
                CodingStatistics& sums) {
   sums.magnitude.resize(static_cast<std::size_t>(components) * band_count);
   sums.coefficients.resize(sums.magnitude.size());
   const auto edges = band_edges(window.points, window.points, rate_hz);
   for (int c = 0; c < components; ++c) {
-    const auto row = wanted.subspan(static_cast<std::size_t>(c) * static_cast<std::size_t>(window.points),
-                                    static_cast<std::size_t>(window.points));
+    const auto row = wanted.subspan(static_cast<std::size_t>(c) * static_cast<std::size_t>(functions),
+                                    static_cast<std::size_t>(functions));
     for (std::size_t band = 0; band < band_count; ++band) {
       const std::size_t cell = static_cast<std::size_t>(c) * band_count + band;
-      for (int k = edges[band]; k < edges[band + 1]; ++k) {
+      for (int k = edges[band]; k < std::min(edges[band + 1], functions); ++k) {
         const double size = std::abs(row[static_cast<std::size_t>(k)]);
         if (size > unlikely) sums.magnitude[cell] += std::floor(size + 0.5);
       }
@@ -101,7 +122,7 @@ void add_plain(std::span<const double> wanted, const WindowPlace& window, double
 // The state of one attempt.
 struct MotionSpaceEncoder::Coding {
   Attempt attempt;
-  std::vector<std::vector<double>> wanted;   // by window, [component][function], in steps
+  std::vector<RowMatrix> wanted;             // by window, [component][active function], in steps
   std::vector<CodingStatistics> statistics;  // by group
   std::vector<ClipErrorSums> errors;
 
@@ -143,13 +164,11 @@ void MotionSpaceEncoder::code_groups(Coding& coding, const MotionSpaceSettings& 
     for (std::size_t i = 0; i < group.count; ++i) {
       const WindowPlace& window = a.layout.windows[group.first + i];
       const auto functions = static_cast<std::size_t>(window.functions);
-      const auto points = static_cast<std::size_t>(window.points);
-      wanted[i].resize(components * functions);
+      const RowMatrix& active = coding.wanted[group.first + i];
+      const Eigen::Index known = std::min<Eigen::Index>(active.cols(), window.functions);
+      wanted[i].assign(components * functions, 0.0);
       values[i].assign(components * functions, 0.0);
-      for (std::size_t c = 0; c < components; ++c) {
-        std::copy_n(coding.wanted[group.first + i].begin() + static_cast<std::ptrdiff_t>(c * points), functions,
-                    wanted[i].begin() + static_cast<std::ptrdiff_t>(c * functions));
-      }
+      Eigen::Map<RowMatrix>(wanted[i].data(), active.rows(), window.functions).leftCols(known) = active.leftCols(known);
       blocks.push_back({window.functions, window.edges, window.follows, wanted[i], values[i]});
     }
     a.groups[g] = encode_group(blocks, a.tables.coding, settings.rate_weight, coding.statistics[g]);
@@ -172,14 +191,6 @@ void MotionSpaceEncoder::code_groups(Coding& coding, const MotionSpaceSettings& 
   for (const ClipErrorSums& error : coding.errors) a.error.add(error);
 }
 
-void MotionSpaceEncoder::scale(std::size_t w, const WindowPlace& window, const Eigen::MatrixXd& mixing,
-                               std::vector<double>& wanted) const {
-  wanted.resize(static_cast<std::size_t>(mixing.rows()) * static_cast<std::size_t>(window.points));
-  Eigen::Map<RowMatrix>(wanted.data(), mixing.rows(), window.points).noalias() =
-      (finer_factor(window.finer) * mixing) *
-      Eigen::Map<const RowMatrix>(coefficients_[w].data(), reference_.dimensions(), window.points);
-}
-
 Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& settings, const Attempt* learned,
                                     std::span<const int> finer) const {
   Coding coding;
@@ -193,13 +204,12 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
     for (std::size_t b = 0; b < a.clips.clips[c].blocks.size(); ++b)
       a.clips.clips[c].finer[b] = finer[first_window_[c] + b];
   }
-  Eigen::MatrixXd mixing;
   a.layout = lay_out(a.clips, {}, settings.group_frames);
   std::vector<std::size_t> windows;  // that are coded
   for (std::size_t g = 0; g < a.layout.groups.size(); g += static_cast<std::size_t>(settings.sample)) {
     for (std::size_t i = 0; i < a.layout.groups[g].count; ++i) windows.push_back(a.layout.groups[g].first + i);
   }
-  choose_basis(a.layout, windows, a.tables, mixing);
+  const RowMatrix projection = choose_basis(a.layout, windows, a.tables) / step;
   const int components = a.tables.basis.components;
 
   // Scaled coefficients, and what the spectrum of their plain rounding is.
@@ -210,9 +220,13 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
     for (std::size_t i = part * windows_at_once; i < end; ++i) {
       const std::size_t w = windows[i];
       const WindowPlace& window = a.layout.windows[w];
-      scale(w, window, mixing / step, coding.wanted[w]);
-      add_plain(coding.wanted[w], window, a.clips.clips[static_cast<std::size_t>(window.clip)].rate_hz, components,
-                plain[part]);
+      const double factor = finer_factor(window.finer);
+      const int functions = active_functions(w, step / factor);
+      const Eigen::Map<const RowMatrix> all(coefficients_[w].data(), reference_.dimensions(), window.points);
+      RowMatrix& wanted = coding.wanted[w];
+      wanted.noalias() = (factor * projection) * all.leftCols(functions);
+      add_plain({wanted.data(), static_cast<std::size_t>(wanted.size())}, functions, window,
+                a.clips.clips[static_cast<std::size_t>(window.clip)].rate_hz, components, plain[part]);
     }
   });
   CodingStatistics first;

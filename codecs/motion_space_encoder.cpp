@@ -112,11 +112,12 @@ void MotionSpaceEncoder::plan(double step, const MotionSpaceSettings& settings) 
   weigh(settings.shell_weight);
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { cut(c, step, settings); });
   transform();
+  measure_energies();
 }
 
 void MotionSpaceEncoder::weigh_again(const MotionSpaceSettings& settings) {
   weigh(settings.shell_weight);
-  transform();
+  measure_energies();
 }
 
 void MotionSpaceEncoder::weigh(double shell_weight) {
@@ -131,7 +132,6 @@ void MotionSpaceEncoder::transform() {
   coefficients_.assign(first_window_.back(), {});
 
   const int d = reference_.dimensions();
-  const RowMatrix analysis = exact_.basis.transpose() * metric_;  // B' M B = I
   std::map<int, std::shared_ptr<const WindowTransform>> transforms;
   std::vector<int> lengths;
   for (const ClipEntry& clip : table_.clips) lengths.insert(lengths.end(), clip.blocks.begin(), clip.blocks.end());
@@ -142,17 +142,30 @@ void MotionSpaceEncoder::transform() {
                     [&](std::size_t i) { made[i] = std::make_shared<const WindowTransform>(lengths[i], lengths[i]); });
   for (std::size_t i = 0; i < lengths.size(); ++i) transforms[lengths[i]] = made[i];
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
-    const RowMatrix z = analysis * curves_of(vectors_[c], d);
+    const double* const curves = vectors_[c].values.data();
     int first = 0;
     for (std::size_t b = 0; b < table_.clips[c].blocks.size(); ++b) {
       const int points = table_.clips[c].blocks[b];
       auto& out = coefficients_[first_window_[c] + b];
       out.resize(static_cast<std::size_t>(d) * static_cast<std::size_t>(points));
-      transforms.at(points)->analyse(z.data() + first, z.cols(), d, out.data());
+      transforms.at(points)->analyse(curves + first, vectors_[c].frames, d, out.data());
       first += points;
     }
   });
   progress_.check_stop();
+}
+
+void MotionSpaceEncoder::measure_energies() {
+  const RowMatrix root = Eigen::MatrixXd(metric_.llt().matrixU());
+  energies_.resize(coefficients_.size());
+  tbb::parallel_for(std::size_t{0}, coefficients_.size(), [&](std::size_t w) {
+    const Eigen::Index d = root.rows();
+    const auto points = static_cast<Eigen::Index>(coefficients_[w].size()) / d;
+    const RowMatrix moved =
+        root.triangularView<Eigen::Upper>() * Eigen::Map<const RowMatrix>(coefficients_[w].data(), d, points);
+    energies_[w].resize(static_cast<std::size_t>(points));
+    Eigen::Map<Eigen::RowVectorXd>(energies_[w].data(), points) = moved.colwise().squaredNorm();
+  });
 }
 
 void MotionSpaceEncoder::cut(std::size_t c, double step, const MotionSpaceSettings& settings) {

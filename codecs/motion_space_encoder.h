@@ -53,12 +53,12 @@ class MotionSpaceEncoder {
   void cut(std::size_t clip, double step, const MotionSpaceSettings& settings);
   void weigh(double shell_weight);
   void transform();
-  void choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows, MotionSpaceTables& tables,
-                    Eigen::MatrixXd& mixing) const;
-  [[nodiscard]] double gain_of(int component, double step, const WindowLayout& layout,
-                               std::span<const std::size_t> windows) const;
-  void scale(std::size_t w, const WindowPlace& window, const Eigen::MatrixXd& mixing,
-             std::vector<double>& wanted) const;
+  void measure_energies();
+  [[nodiscard]] int active_functions(std::size_t window, double step) const;
+  [[nodiscard]] Eigen::VectorXd gains(double step, const WindowLayout& layout,
+                                      std::span<const std::size_t> windows) const;
+  [[nodiscard]] Eigen::MatrixXd choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows,
+                                             MotionSpaceTables& tables) const;
   void code_groups(Coding& coding, const MotionSpaceSettings& settings, bool measure) const;
 
   std::span<const Clip> clips_;
@@ -72,7 +72,8 @@ class MotionSpaceEncoder {
   Eigen::MatrixXd metric_;
   KarhunenLoeve exact_;
   std::vector<std::size_t> first_window_;          // by clip, and the end
-  std::vector<std::vector<double>> coefficients_;  // by window: [component][point], all functions, exact basis
+  std::vector<std::vector<double>> coefficients_;  // by window: [dimension][point], all functions of the pose vectors
+  std::vector<std::vector<double>> energies_;      // by window and function: what it moves, squared, in the metric
 };
 
 // The finished stream.

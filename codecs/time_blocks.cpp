@@ -10,7 +10,6 @@
 #include <Eigen/Cholesky>
 
 #include "codecs/natural_functions.h"
-#include "motion/simd.h"
 
 namespace kinespace {
 namespace {
@@ -37,10 +36,6 @@ Eigen::MatrixXd half_fit(const NaturalFunctions& functions, int parity) {
   if (functions.points() % 2 == 1) weight(f.rows() - 1) = 1;
   const Eigen::MatrixXd gram = f.transpose() * weight.asDiagonal() * f;
   return gram.llt().solve(f.transpose()).transpose();
-}
-
-KINESPACE_VECTOR_CLONES void add_scaled(const double* row, double a, double* sum, std::size_t n) {
-  for (std::size_t k = 0; k < n; ++k) sum[k] += a * row[k];
 }
 
 // The windows' lengths in grid steps that are tried; a window of m steps begins at multiples of about m / 4.
@@ -146,23 +141,23 @@ WindowTransform::WindowTransform(int points, int functions) : points_(points), f
 }
 
 void WindowTransform::analyse(const double* curves, std::ptrdiff_t stride, int curve_count, double* out) const {
-  const auto n = static_cast<std::size_t>(points_);
-  const auto functions = static_cast<std::size_t>(functions_);
-  const std::size_t evens = (functions + 1) / 2;
-  const std::size_t odds = functions - evens;
-  std::vector<double> sums(functions);
-  for (int c = 0; c < curve_count; ++c) {
-    const double* curve = curves + c * stride;
-    std::ranges::fill(sums, 0.0);
-    for (std::size_t t = 0; t < (n + 1) / 2; ++t) {
-      const double* row = table_.data() + t * functions;
-      const bool middle = 2 * t + 1 == n;
-      const double mirror = curve[n - 1 - t];
-      add_scaled(row, middle ? curve[t] : curve[t] + mirror, sums.data(), evens);
-      if (!middle) add_scaled(row + evens, curve[t] - mirror, sums.data() + evens, odds);
-    }
-    double* target = out + static_cast<std::size_t>(c) * functions;
-    for (std::size_t k = 0; k < functions; ++k) target[k] = k % 2 == 0 ? sums[k / 2] : sums[evens + k / 2];
+  using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  using Table = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
+  const Eigen::Index n = points_;
+  const Eigen::Index half = (n + 1) / 2;
+  const Eigen::Index evens = (functions_ + 1) / 2;
+  const Eigen::Index odds = functions_ - evens;
+  // Even functions see the sums of mirrored points, odd ones their differences.
+  const Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>> all(curves, curve_count, n, Eigen::OuterStride<>(stride));
+  RowMatrix folded = all.leftCols(half) + all.rightCols(half).rowwise().reverse();
+  if (n % 2 == 1) folded.col(half - 1) = all.col(half - 1);
+  const RowMatrix even = folded * Table(table_.data(), half, evens, Eigen::OuterStride<>(functions_));
+  folded = all.leftCols(half) - all.rightCols(half).rowwise().reverse();
+  const RowMatrix odd = folded * Table(table_.data() + evens, half, odds, Eigen::OuterStride<>(functions_));
+  for (Eigen::Index c = 0; c < curve_count; ++c) {
+    double* target = out + c * functions_;
+    for (Eigen::Index k = 0; k < evens; ++k) target[2 * k] = even(c, k);
+    for (Eigen::Index k = 0; k < odds; ++k) target[2 * k + 1] = odd(c, k);
   }
 }
 

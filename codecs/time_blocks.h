@@ -37,7 +37,7 @@ class WindowTransform {
  private:
   int points_;
   int functions_;
-  std::vector<double> table_;  // [function][point]
+  std::vector<double> table_;  // [point of the first half][even functions, then odd ones]
 };
 
 }  // namespace kinespace
