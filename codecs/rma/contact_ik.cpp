@@ -1,0 +1,187 @@
+#include "codecs/rma/contact_ik.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "codecs/rma/root_alignment.h"
+
+namespace kinespace {
+namespace {
+
+constexpr double blending_s = 0.03;
+constexpr double damping_cm = 1;
+constexpr double near_enough_cm = 0.02;
+constexpr double largest_turn = 0.5;  // radians in one round
+constexpr int most_rounds = 8;
+constexpr int turning_joints = 2;
+
+// (m + damping)^-1 e of a symmetric matrix, by its adjugate.
+Eigen::Vector3d solve(const Eigen::Matrix3d& m, const Eigen::Vector3d& e) {
+  const double a = m(0, 0), b = m(0, 1), c = m(0, 2), d = m(1, 1), f = m(1, 2), g = m(2, 2);
+  const double aa = d * g - f * f;
+  const double ab = c * f - b * g;
+  const double ac = b * f - c * d;
+  const double dd = a * g - c * c;
+  const double df = b * c - a * f;
+  const double gg = a * d - b * b;
+  const double scale = 1 / (a * aa + b * ab + c * ac);
+  return {scale * (aa * e.x() + ab * e.y() + ac * e.z()), scale * (ab * e.x() + dd * e.y() + df * e.z()),
+          scale * (ac * e.x() + df * e.y() + gg * e.z())};
+}
+
+// The joints from joint 0 to a touching one, and those of them that turn.
+struct Limb {
+  int joint = 0;
+  std::vector<int> path;
+  std::size_t most_turning = 0;
+  std::vector<double> weight;           // by frame: 0 where nothing is corrected
+  std::vector<Eigen::Vector3d> target;  // by frame
+  std::vector<char> in_contact;
+};
+
+class Solver {
+ public:
+  // Turns the joints path[turning..] of one frame until the last is at the target. `turning` falls (from the limb's end
+  // upwards).
+  void solve_frame(Clip& clip, int frame, const std::vector<int>& path, std::span<const std::size_t> turning,
+                   const Eigen::Vector3d& target) {
+    const std::size_t n = path.size();
+    local_.resize(n);
+    world_.resize(n);
+    at_.resize(n);
+    offset_.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      local_[i] = clip.rotation(path[i], frame);
+      offset_[i] = clip.translation(path[i], frame);
+    }
+    forward(0);
+    bool moved = false;
+    for (int round = 0; round < most_rounds; ++round) {
+      const Eigen::Vector3d e = target - at_[n - 1];
+      if (!(e.squaredNorm() > near_enough_cm * near_enough_cm)) break;
+      turn_towards(e, turning);
+      forward(turning.back());
+      moved = true;
+    }
+    for (const std::size_t i : turning) {
+      if (moved) clip.set_rotation(path[i], frame, local_[i].normalized());
+    }
+  }
+
+ private:
+  void forward(std::size_t from) {
+    for (std::size_t i = from; i < local_.size(); ++i) {
+      at_[i] = i == 0 ? offset_[i] : Eigen::Vector3d(at_[i - 1] + world_[i - 1] * offset_[i]);
+      const Eigen::Matrix3d own = local_[i].toRotationMatrix();
+      world_[i] = i == 0 ? own : Eigen::Matrix3d(world_[i - 1] * own);
+    }
+  }
+  void turn_towards(const Eigen::Vector3d& e, std::span<const std::size_t> turning) {
+    const Eigen::Vector3d& end = at_.back();
+    Eigen::Matrix3d jj = damping_cm * damping_cm * Eigen::Matrix3d::Identity();
+    for (const std::size_t i : turning) {
+      const Eigen::Vector3d r = end - at_[i];
+      jj += r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose();
+    }
+    const Eigen::Vector3d y = solve(jj, e);
+    for (const std::size_t i : turning) {
+      Eigen::Vector3d w = (end - at_[i]).cross(y);
+      const double size = w.norm();
+      if (size > largest_turn) w *= largest_turn / size;
+      if (i > 0) w = world_[i - 1].transpose() * w;
+      local_[i] = from_rodrigues(w) * local_[i];
+    }
+  }
+
+  std::vector<Eigen::Quaterniond> local_;
+  std::vector<Eigen::Matrix3d> world_;
+  std::vector<Eigen::Vector3d> at_;
+  std::vector<Eigen::Vector3d> offset_;
+};
+
+void add_track(const Clip& clip, const ContactTrack& track, int blending, Limb& limb) {
+  const int count = static_cast<int>(track.points.size());
+  const int last = track.first + count;
+  for (int i = 0; i < count; ++i) {
+    const auto f = static_cast<std::size_t>(track.first + i);
+    limb.weight[f] = 1;
+    limb.in_contact[f] = 1;
+    limb.target[f] = track.points[static_cast<std::size_t>(i)];
+  }
+  const int from = std::max(0, track.first - blending);
+  const int to = std::min(clip.frames, last + blending);
+  const auto before = joint_path(clip, limb.joint, from, track.first - from + 1);
+  const auto after = joint_path(clip, limb.joint, last - 1, to - last + 1);
+  const Eigen::Vector3d first_off = track.points.front() - before.back();
+  const Eigen::Vector3d last_off = track.points.back() - after.front();
+  const auto fade = [&](int frame, int distance, const Eigen::Vector3d& own, const Eigen::Vector3d& off) {
+    const auto f = static_cast<std::size_t>(frame);
+    const double u = 1 - static_cast<double>(distance) / (blending + 1);
+    const double weight = u * u * (3 - 2 * u);
+    if (weight <= limb.weight[f]) return;  // of another contact, which is nearer
+    limb.weight[f] = weight;
+    limb.target[f] = own + weight * off;
+  };
+  for (int f = from; f < track.first; ++f)
+    fade(f, track.first - f, before[static_cast<std::size_t>(f - from)], first_off);
+  for (int f = last; f < to; ++f) fade(f, f - last + 1, after[static_cast<std::size_t>(f - last + 1)], last_off);
+}
+
+std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> tracks) {
+  const auto frames = static_cast<std::size_t>(clip.frames);
+  const int blending = static_cast<int>(std::min(std::ceil(blending_s * clip.rate_hz), 1e4));
+  std::vector<Limb> out;
+  // Contacts before their fading, so that no fading takes a frame of a contact.
+  for (const ContactTrack& track : tracks) {
+    if (out.empty() || out.back().joint != track.joint) {
+      Limb limb{.joint = track.joint,
+                .path = {},
+                .most_turning = turning_joints,
+                .weight = {},
+                .target = {},
+                .in_contact = {}};
+      for (int j = track.joint; j >= 0; j = clip.skeleton.joints[static_cast<std::size_t>(j)].parent)
+        limb.path.push_back(j);
+      std::ranges::reverse(limb.path);
+      for (const Limb& other : out) {
+        if (std::ranges::find(limb.path, other.joint) != limb.path.end()) ++limb.most_turning;
+      }
+      limb.weight.assign(frames, 0.0);
+      limb.target.assign(frames, Eigen::Vector3d::Zero());
+      limb.in_contact.assign(frames, 0);
+      out.push_back(std::move(limb));
+    }
+    add_track(clip, track, blending, out.back());
+  }
+  return out;
+}
+
+}  // namespace
+
+void hold_contacts(Clip& clip, std::span<const ContactTrack> tracks) {
+  std::vector<Limb> limbs = limbs_of(clip, tracks);
+  const int root = clip.skeleton.travel_root();
+  Solver solver;
+  std::vector<std::size_t> turning;
+  // Parents stand before children in a skeleton, and tracks are sorted by joint.
+  for (const Limb& limb : limbs) {
+    for (int f = 0; f < clip.frames; ++f) {
+      const auto frame = static_cast<std::size_t>(f);
+      if (limb.weight[frame] == 0) continue;
+      turning.clear();
+      for (std::size_t i = limb.path.size() - 1; i-- > 0 && turning.size() < limb.most_turning;) {
+        const int joint = limb.path[i];
+        if (joint <= root) break;
+        if (!clip.skeleton.joints[static_cast<std::size_t>(joint)].has_rotation()) continue;
+        turning.push_back(i);
+        const bool stands = std::ranges::any_of(
+            limbs, [&](const Limb& other) { return other.joint == joint && other.weight[frame] != 0; });
+        if (stands) break;
+      }
+      if (!turning.empty()) solver.solve_frame(clip, f, limb.path, turning, limb.target[frame]);
+    }
+  }
+}
+
+}  // namespace kinespace

@@ -1,0 +1,75 @@
+// Where joints touch the ground, kept apart from the postures (lin2011, section 5.3, figure 11): what a smoothed
+// posture loses first is that a foot stands still.
+//
+// The floor is found from the data: the heights of a joint that lie together at the bottom are its lowest cluster, the
+// mean of it the height at which it rests; the lowest of these is the floor, and joints that rest at most 15 cm above
+// it can touch the ground. Such a joint is in contact from when it comes near the height where it rests until it leaves
+// it or moves by more than 2.5 cm between two frames, where a new contact begins.
+//
+// A contact is kept as whole steps: at its first frame the difference to where the decoded posture has the joint (8
+// bits of 1 mm), then from frame to frame how it moved (4 bits of 2.5 cm / 8, against what the decoder has, so that
+// nothing piles up). The decoder takes the stairs off by a mean over 60 ms.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "codecs/rma/value_coder.h"
+#include "motion/clip.h"
+
+namespace kinespace {
+
+struct ContactOptions {
+  double near_cm = 3;         // above the height where it rests, up to which a joint touches the ground, > 0
+  double move_cm = 2.5;       // farthest that a contact moves between two frames, > 0
+  double fastest_cm_s = 1e9;  // and no faster than this, > 0: below the rule above only at high frame rates
+  double shortest_s = 0.1;    // of a contact, >= 0
+  double still_cm = 0.15625;  // a move is coded once the joint is off by this: half a step or more
+  void validate() const;      // throws Error{usage} naming field, value and range
+};
+
+// Frames [first, first + points) of one joint.
+struct ContactTrack {
+  int joint = 0;
+  int first = 0;
+  std::vector<Eigen::Vector3d> points;  // cm, world
+};
+
+// The contacts of a clip by joint, then by time.
+[[nodiscard]] std::vector<ContactTrack> find_contacts(const Clip& clip, const ContactOptions& options = {});
+
+// A contact in whole steps.
+struct ContactCode {
+  static constexpr double start_step_cm = 0.1;
+  static constexpr double move_step_cm = 2.5 / 8;
+  static constexpr int farthest_start = 127;
+  static constexpr int farthest_move = 7;
+
+  int joint = 0;
+  int first = 0;
+  std::array<std::int8_t, 3> start{};
+  std::vector<std::array<std::int8_t, 3>> moves;  // of every later frame
+
+  [[nodiscard]] int frames() const { return static_cast<int>(moves.size()) + 1; }
+};
+
+// `decoded`: the clip as the decoder has it before contacts.
+[[nodiscard]] std::vector<ContactCode> code_contacts(std::span<const ContactTrack> tracks, const Clip& decoded,
+                                                     const ContactOptions& options = {});
+[[nodiscard]] std::vector<ContactTrack> contact_tracks(std::span<const ContactCode> codes, const Clip& decoded);
+
+// Contexts that these take of a ValueWriter, from 0 on.
+inline constexpr int contact_contexts = 24;
+void put_contacts(ValueWriter& out, std::span<const ContactCode> codes);
+// `frames` and `joints`: of the clip.
+[[nodiscard]] std::vector<ContactCode> get_contacts(ValueReader& in, int frames, int joints);
+
+// The world positions of a joint, cm, in frames [first, first + count).
+[[nodiscard]] std::vector<Eigen::Vector3d> joint_path(const Clip& clip, int joint, int first, int count);
+
+}  // namespace kinespace
