@@ -1,4 +1,5 @@
-// `kinespace bench codecs`: bytes per frame of the motion-space codec at given errors, and how fast it is.
+// `kinespace bench codecs`: what codecs make of clips. Sizes of the motion-space codec at given errors and its speed;
+// every codec over its range of qualities; the tables and figures of khan2014 and yoo2019.
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -8,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "bench/codec_papers.h"
 #include "bench/report.h"
 #include <fmt/format.h>
 #include <tbb/global_control.h>
@@ -134,13 +136,25 @@ void measure_largest(const CodecData& data, double target_cm, std::size_t every,
        .higher_is_better = true});
 }
 
-}  // namespace
+// Climbing, jumping and turning, walking, running, jumping, bending: what the papers' clips do.
+std::vector<fs::path> paper_clips(const BenchOptions& options) {
+  if (!options.clips.empty()) return options.clips;
+  std::vector<fs::path> out;
+  for (const char* clip : {"01/01_01", "02/02_01", "02/02_03", "02/02_04"}) {
+    out.push_back(options.data / "cmu" / (std::string(clip) + ".amc"));
+  }
+  return out;
+}
 
-BenchReport bench_codecs(const BenchOptions& options) {
-  BenchReport report{.bench = "codecs",
-                     .device = "cpu",
-                     .threads = static_cast<int>(std::thread::hardware_concurrency()),
-                     .results = {}};
+void add_papers(const BenchOptions& options, BenchReport& report) {
+  std::vector<ClipSweep> sweeps;
+  for (const fs::path& clip : paper_clips(options)) sweeps.push_back(sweep_clip(clip));
+  add_khan2014(sweeps, report);
+  for (const ClipSweep& sweep : sweeps) add_sweep(sweep, report);
+  if (options.clips.empty()) add_yoo2019(options, report);
+}
+
+void add_motion_space(const BenchOptions& options, BenchReport& report) {
   CodecData bandai{.name = "bandai2, one stream", .streams = {}};
   bandai.streams.push_back(read_folder(options.data / "bandai2"));
   for (const Bar& bar : {Bar{0.1, 14}, Bar{0.35, 6.5}, Bar{0.5, 4.5}, Bar{1.0, 2.6}, Bar{2.4, 1.2}}) {
@@ -153,6 +167,15 @@ BenchReport bench_codecs(const BenchOptions& options) {
     measure(cmu, bar, report);
   }
   measure_largest(cmu, 1, 4, report);
+}
+
+}  // namespace
+
+BenchReport bench_codecs(const BenchOptions& options) {
+  BenchReport report{
+      .bench = "codecs", .device = "cpu", .threads = static_cast<int>(std::thread::hardware_concurrency())};
+  if (options.clips.empty()) add_motion_space(options, report);
+  add_papers(options, report);
   return report;
 }
 

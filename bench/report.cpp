@@ -1,5 +1,7 @@
 #include "bench/report.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -9,6 +11,7 @@ namespace {
 // A bar inside a markdown cell would end it.
 std::string cell(const std::string& text) {
   std::string out;
+  out.reserve(text.size());
   for (const char c : text) {
     if (c == '|') out += '\\';
     out += c == '\n' ? ' ' : c;
@@ -24,6 +27,23 @@ std::string bar(const BenchResult& result) {
 std::string verdict(const BenchResult& result) {
   if (!result.bar) return "";
   return result.ok() ? "yes" : "**no**";
+}
+
+std::string words(const BenchCell& value) {
+  return value.number ? fmt::format("{:.4g}", *value.number) : value.text;
+}
+
+nlohmann::ordered_json json(const BenchTable& table) {
+  using Json = nlohmann::ordered_json;
+  Json rows = Json::array();
+  for (const auto& row : table.rows) {
+    Json cells = Json::array();
+    for (const BenchCell& value : row) {
+      cells.push_back(value.number ? Json(*value.number) : value.text.empty() ? Json() : Json(value.text));
+    }
+    rows.push_back(std::move(cells));
+  }
+  return {{"title", table.title}, {"columns", table.columns}, {"rows", std::move(rows)}};
 }
 
 }  // namespace
@@ -48,8 +68,13 @@ std::string to_json(const BenchReport& report) {
                        {"bar", result.bar ? Json(*result.bar) : Json()},
                        {"ok", result.ok()}});
   }
-  const Json object{
-      {"bench", report.bench}, {"device", report.device}, {"threads", report.threads}, {"results", results}};
+  Json tables = Json::array();
+  for (const BenchTable& table : report.tables) tables.push_back(json(table));
+  const Json object{{"bench", report.bench},
+                    {"device", report.device},
+                    {"threads", report.threads},
+                    {"results", results},
+                    {"tables", tables}};
   return object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
@@ -61,6 +86,42 @@ std::string to_markdown(const BenchReport& report) {
     out += fmt::format("| {} | {} | {:.4g} | {} | {} | {} |\n", cell(result.name), cell(result.data), result.value,
                        cell(result.unit), bar(result), verdict(result));
   }
+  for (const BenchTable& table : report.tables) out.append("\n").append(to_markdown(table));
+  return out;
+}
+
+std::string to_markdown(const BenchTable& table) {
+  std::string out = fmt::format("### {}\n\n|", table.title);
+  for (const std::string& column : table.columns) out += fmt::format(" {} |", cell(column));
+  out += "\n|";
+  for (std::size_t c = 0; c < table.columns.size(); ++c) out += c == 0 ? "---|" : "---:|";
+  for (const auto& row : table.rows) {
+    out += "\n|";
+    for (const BenchCell& value : row) out += fmt::format(" {} |", cell(words(value)));
+  }
+  out += '\n';
+  return out;
+}
+
+std::string to_text(const BenchTable& table) {
+  std::vector<std::size_t> widths;
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    widths.push_back(table.columns[c].size());
+    for (const auto& row : table.rows) widths[c] = std::max(widths[c], words(row[c]).size());
+  }
+  std::string out = fmt::format("{}\n", table.title);
+  const auto add = [&](std::size_t c, const std::string& text) {
+    const std::size_t gap = widths[c] - text.size();
+    out.append(c == 0 ? 2 : gap + 2, ' ');
+    out += text;
+    if (c == 0) out.append(gap, ' ');
+  };
+  for (std::size_t c = 0; c < widths.size(); ++c) add(c, table.columns[c]);
+  for (const auto& row : table.rows) {
+    out += "\n";
+    for (std::size_t c = 0; c < widths.size(); ++c) add(c, words(row[c]));
+  }
+  out += '\n';
   return out;
 }
 

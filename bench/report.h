@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace kinespace {
@@ -21,25 +22,59 @@ struct BenchResult {
   [[nodiscard]] bool ok() const { return !bar || (higher_is_better ? value >= *bar : value <= *bar); }
 };
 
+// A cell of a table: words, a number, or nothing.
+struct BenchCell {
+  BenchCell() = default;
+  BenchCell(double value) : number(value) {}                 // NOLINT(google-explicit-constructor): rows read as lists
+  BenchCell(std::string words) : text(std::move(words)) {}   // NOLINT(google-explicit-constructor)
+  BenchCell(std::string_view words) : text(words) {}         // NOLINT(google-explicit-constructor)
+  BenchCell(const char* words) : text(words) {}              // NOLINT(google-explicit-constructor)
+  BenchCell(std::optional<double> value) : number(value) {}  // NOLINT(google-explicit-constructor)
+
+  std::string text;
+  std::optional<double> number;
+};
+
+// A table of a paper, remade from the data given: what has no bar, or is read side by side.
+struct BenchTable {
+  std::string title;
+  std::vector<std::string> columns;
+  std::vector<std::vector<BenchCell>> rows;  // each as long as `columns`
+};
+
+// A figure of a paper, remade: SVG.
+struct BenchPicture {
+  std::string name;  // of the file, without its ending
+  std::string svg;
+};
+
 struct BenchReport {
   std::string bench;
   std::string device;  // what computed
   int threads = 1;
   std::vector<BenchResult> results;
+  std::vector<BenchTable> tables;
+  std::vector<BenchPicture> pictures;
 };
 
 struct BenchOptions {
+  // Instead of what the bench takes from `data`, where it can: bench codecs.
+  std::vector<std::filesystem::path> clips;
   std::filesystem::path data;                   // folder with cmu/, bandai1/, bandai2/
   std::optional<std::filesystem::path> golden;  // folder of golden FPCA cases
   std::string device = "auto";
 };
 
 // The report as one JSON object: bench, device, threads, results: [{name, data, value, unit, bar, ok}], bar null where
-// there is none.
+// there is none; tables: [{title, columns, rows}], an empty cell null.
 [[nodiscard]] std::string to_json(const BenchReport& report);
 
 // The report as a markdown table: a heading, what computed it, one row a result. What docs/results.md is made of.
 [[nodiscard]] std::string to_markdown(const BenchReport& report);
+
+// The same for one table, and as lines of columns for a terminal.
+[[nodiscard]] std::string to_markdown(const BenchTable& table);
+[[nodiscard]] std::string to_text(const BenchTable& table);
 
 // A bench by its name, as the command offers it.
 struct Bench {

@@ -7,6 +7,7 @@
 #include "bench/report.h"
 #include <fmt/format.h>
 
+#include "base/file.h"
 #include "cli/commands.h"
 
 namespace kinespace::cli {
@@ -16,6 +17,8 @@ struct BenchCommandOptions {
   std::string name;
   std::string data;
   std::string golden;
+  std::vector<std::filesystem::path> clips;
+  std::filesystem::path pictures;
   std::string device = "auto";
   bool json = false;
   bool markdown = false;
@@ -32,6 +35,14 @@ void print_rows(const BenchReport& report) {
     }
     fmt::print("  {}, {}: {:.4g} {}{}\n", result.name, result.data, result.value, result.unit, verdict);
   }
+  for (const BenchTable& table : report.tables) fmt::print("\n{}", to_text(table));
+}
+
+void write_pictures(const BenchReport& report, const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  for (const BenchPicture& picture : report.pictures) {
+    write_file_atomically(folder / (picture.name + ".svg"), picture.svg);
+  }
 }
 
 void run_bench(const BenchCommandOptions& options) {
@@ -42,9 +53,11 @@ void run_bench(const BenchCommandOptions& options) {
   if (options.name.empty()) throw CLI::RequiredError("NAME");
   BenchOptions bench_options{.data = options.data, .device = options.device};
   if (!options.golden.empty()) bench_options.golden = options.golden;
+  bench_options.clips = options.clips;
   for (const Bench& bench : all_benches()) {
     if (bench.name != options.name) continue;
     const BenchReport report = bench.run(bench_options);
+    if (!options.pictures.empty()) write_pictures(report, options.pictures);
     if (options.json) {
       fmt::print("{}", to_json(report));
     } else if (options.markdown) {
@@ -71,6 +84,8 @@ void add_bench(CLI::App& app, Session& /*session*/) {
       ->capture_default_str();
   command->add_option("--golden", options->golden, "Folder of golden FPCA cases")->envname("KINESPACE_GOLDEN");
   command->add_option("--device", options->device, "auto, cpu or opencl[:N]")->capture_default_str();
+  command->add_option("--clips", options->clips, "bench codecs: sweep these clips (.bvh, .amc) instead");
+  command->add_option("--pictures", options->pictures, "Folder for the bench's figures, as SVG");
   auto* json = command->add_flag("--json", options->json, "Print one JSON object");
   command->add_flag("--markdown", options->markdown, "Print a markdown table")->excludes(json);
   command->callback([options] { run_bench(*options); });
