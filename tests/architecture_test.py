@@ -19,11 +19,12 @@ ARROWS = {
     "fpca": "base motion storage kernels",
     "footskate": "base motion storage",
     "synthesis": "base motion storage kernels fpca",
-    "codecs": "base motion storage kernels fpca",
-    "examples": "base motion storage kernels fpca footskate synthesis codecs",
-    "bench": "base motion storage kernels fpca footskate synthesis codecs examples",
-    "cli": "base motion storage kernels fpca footskate synthesis codecs bench",
-    "tests": "base motion storage kernels fpca footskate synthesis codecs examples bench cli",
+    "mesh": "base motion storage",
+    "codecs": "base motion storage kernels fpca mesh",
+    "examples": "base motion storage kernels fpca footskate synthesis mesh codecs",
+    "bench": "base motion storage kernels fpca footskate synthesis mesh codecs examples",
+    "cli": "base motion storage kernels fpca footskate synthesis mesh codecs bench",
+    "tests": "base motion storage kernels fpca footskate synthesis mesh codecs examples bench cli",
 }
 ARROWS = {folder: set(others.split()) | {folder} for folder, others in ARROWS.items()}
 
