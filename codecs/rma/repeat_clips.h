@@ -1,0 +1,30 @@
+// From choices in self-distance tables to clips of frames. Private to this folder.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "codecs/rma/repeats.h"
+
+namespace kinespace {
+
+class ClipCollector {
+ public:
+  // Unique clips shorter than `shortest_s` are merged with a neighbour where there is one.
+  ClipCollector(const FrameTable& table, double shortest_s);
+
+  void add(int group, const SelfDistance& distances, std::span<const PrimaryChoice> choices);
+  void add_unique(int group, std::span<const FrameRange> ranges);
+
+  // All clips, in time.
+  [[nodiscard]] std::vector<RepeatClip> finish() &&;
+
+ private:
+  void add_run(int group, FrameRange range, std::vector<RepeatClip> held);
+
+  std::int64_t shortest_;
+  std::vector<RepeatClip> clips_;      // until finish(), `primary` of primary and repeated clips is an index of
+  std::vector<FrameRange> primaries_;  // these: primary clips as they were chosen
+};
+
+}  // namespace kinespace
