@@ -113,6 +113,11 @@ class Bitstream {
   // In the stream's order.
   [[nodiscard]] std::vector<std::string> section_names() const;
   [[nodiscard]] bool has_section(std::string_view name) const { return find(name) != nullptr; }
+  // False when there is no such section.
+  [[nodiscard]] bool is_progressive(std::string_view name) const {
+    const Section* section = find(name);
+    return section != nullptr && section->progressive;
+  }
   // The bytes of a plain section, checked against its checksum at every call.
   // Throws Error{bad_input} when it is missing or damaged.
   [[nodiscard]] std::span<const std::byte> section(std::string_view name) const;

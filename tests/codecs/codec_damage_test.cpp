@@ -1,0 +1,138 @@
+// What every codec owes the one who opens a stream: clips, or an error that names the file, for any bytes at all.
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "tests/codecs/forged_stream.h"
+#include "tests/codecs/sample_stream.h"
+#include "tests/support/allocation_meter.h"
+
+namespace kinespace {
+namespace {
+
+constexpr std::size_t base_memory = std::size_t{64} << 20;
+constexpr std::size_t memory_a_byte = 16;
+
+// True when the bytes gave clips. No more memory than the stream's size allows, clips handed out not counted.
+bool decodes(std::span<const std::byte> bytes) {
+  const test::AllocationMeter meter;
+  bool good = false;
+  std::size_t clip_bytes = 0;
+  try {
+    const auto reader = open_stream(bytes, "damaged.ksm");
+    for (std::size_t c = 0; c < reader->clips().size(); c += 2) {
+      const Clip clip = reader->decode(c);
+      EXPECT_EQ(clip.frames, reader->clips()[c].frames);
+      for (const double q : clip.rotations) EXPECT_TRUE(std::isfinite(q));
+      clip_bytes = std::max(clip_bytes, clip.rotations.size() * sizeof(double));
+    }
+    good = true;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::bad_input) << error.what();
+    EXPECT_NE(std::string(error.what()).find("damaged.ksm"), std::string::npos) << error.what();
+  }
+  EXPECT_LE(meter.peak(), memory_a_byte * bytes.size() + base_memory + 2 * clip_bytes);
+  return good;
+}
+
+class CodecDamage : public testing::TestWithParam<const Codec*> {
+ protected:
+  // Four short clips with the codec's own settings, made once.
+  [[nodiscard]] const Bytes& stream() const {
+    static std::map<std::string, Bytes, std::less<>> streams;
+    const std::string name(GetParam()->name());
+    const auto found = streams.find(name);
+    if (found != streams.end()) return found->second;
+    std::vector<Clip> clips;
+    for (std::size_t c = 0; c < 4; ++c) {
+      const Clip& clip = test::sample_clips()[c];
+      clips.push_back(slice(clip, 0, std::min(clip.frames, 60)));
+    }
+    return streams.emplace(name, encode(name, clips)).first->second;
+  }
+};
+
+TEST_P(CodecDamage, every_prefix_is_a_coarser_stream_or_an_error) {
+  const std::size_t stride = 1 + stream().size() / 150;
+  for (std::size_t n = 0; n < stream().size(); n += n < 64 ? 1 : stride) {
+    const bool good = decodes(std::span(stream()).first(n));
+    if (good) {
+      EXPECT_GT(open_stream(stream(), "s")->levels(), 1) << "a codec without levels took a prefix of " << n;
+    }
+  }
+}
+
+TEST_P(CodecDamage, every_flipped_byte_is_noticed) {
+  Bytes changed = stream();
+  const std::size_t stride = 1 + changed.size() / 150;
+  for (std::size_t n = 0; n < changed.size(); n += n < 64 ? 1 : stride) {
+    changed[n] ^= std::byte{0x04};
+    EXPECT_FALSE(decodes(changed)) << n;
+    changed[n] ^= std::byte{0x04};
+  }
+}
+
+TEST_P(CodecDamage, extra_bytes_are_refused) {
+  Bytes longer = stream();
+  longer.push_back(std::byte{0});
+  EXPECT_FALSE(decodes(longer));
+}
+
+TEST_P(CodecDamage, forged_parts_with_fitting_checksums_are_errors_or_clips) {
+  ASSERT_TRUE(decodes(test::forged(stream(), "", {})));
+  int errors = 0;
+  for (const std::string& name : test::parts_of(stream())) {
+    const Bytes whole = test::part(stream(), name);
+    for (std::size_t n = 0; n < whole.size(); n += 1 + whole.size() / 40) {
+      for (const auto mask : {std::byte{0x21}, std::byte{0x80}, std::byte{0xff}}) {
+        Bytes changed = whole;
+        changed[n] ^= mask;
+        errors += decodes(test::forged(stream(), name, changed)) ? 0 : 1;
+      }
+      Bytes shorter = whole;
+      shorter.resize(n);
+      errors += decodes(test::forged(stream(), name, shorter)) ? 0 : 1;
+    }
+    if (!whole.empty()) {
+      EXPECT_FALSE(decodes(test::forged(stream(), name, {}))) << name;
+    }
+    // Varints of the largest counts, wherever the part begins with one.
+    errors += decodes(test::forged(stream(), name, Bytes(64, std::byte{0xff}))) ? 0 : 1;
+  }
+  EXPECT_GT(errors, 10);
+}
+
+TEST_P(CodecDamage, clips_that_are_no_motion_are_refused) {
+  Clip clip = slice(test::sample_clips().front(), 0, 30);
+  clip.rotations[17] = std::numeric_limits<double>::quiet_NaN();
+  try {
+    static_cast<void>(encode(GetParam()->name(), std::span(&clip, 1)));
+    ADD_FAILURE() << "NaN was encoded";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::bad_input) << error.what();
+  }
+}
+
+TEST_P(CodecDamage, clips_of_one_frame_and_of_ten_are_clips) {
+  for (const int frames : {1, 2, 3, 10}) {
+    const Clip clip = slice(test::sample_clips()[1], 5, frames);
+    const Bytes bytes = encode(GetParam()->name(), std::span(&clip, 1));
+    const Clip decoded = open_stream(bytes, "s")->decode(0);
+    ASSERT_EQ(decoded.frames, frames);
+    EXPECT_EQ(decoded.name, clip.name);
+    EXPECT_LT(clip_error(clip, decoded, 0, frames, 0).mean_cm(), 5) << frames;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Codecs, CodecDamage, testing::ValuesIn(all_codecs().begin(), all_codecs().end()),
+                         [](const auto& codec) {
+                           std::string name(codec.param->name());
+                           for (char& c : name) {
+                             if (c == '-' || c == '+') c = '_';
+                           }
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace kinespace

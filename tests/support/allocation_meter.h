@@ -1,0 +1,20 @@
+// How much memory a piece of work holds at most: the heap's high-water mark, by counting every malloc of the process.
+// Under a sanitizer, which brings its own heap, nothing is counted and `counts()` is false.
+#pragma once
+
+#include <cstddef>
+
+namespace kinespace::test {
+
+class AllocationMeter {
+ public:
+  AllocationMeter();  // starts at what is held now
+  [[nodiscard]] static bool counts();
+  // The most that was held at once since, beyond what was held at the start, in bytes.
+  [[nodiscard]] std::size_t peak() const;
+
+ private:
+  std::size_t start_;
+};
+
+}  // namespace kinespace::test
