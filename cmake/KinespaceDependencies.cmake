@@ -14,6 +14,7 @@ find_package(PNG 1.6 REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
+pkg_check_modules(LZMA REQUIRED IMPORTED_TARGET liblzma)
 find_package(ALGLIB REQUIRED)  # sets variables only
 add_library(kinespace_alglib INTERFACE)
 add_library(kinespace::alglib ALIAS kinespace_alglib)

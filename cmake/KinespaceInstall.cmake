@@ -53,5 +53,5 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS pocl-opencl-icd)
 # For programs built on the libraries: what kinespaceConfig.cmake and kinespace.pc look for.
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libeigen3-dev, libarmadillo-dev, libopenblas-dev, libalglib-dev, ocl-icd-opencl-dev, \
-opencl-clhpp-headers, libfmt-dev, libtbb-dev, libxxhash-dev, libzstd-dev, libsqlite3-dev, libtinygltf-dev, libdraco-dev, libmeshoptimizer-dev, libpng-dev, nlohmann-json3-dev, pkg-config")
+opencl-clhpp-headers, libfmt-dev, libtbb-dev, libxxhash-dev, libzstd-dev, liblzma-dev, libsqlite3-dev, libtinygltf-dev, libdraco-dev, libmeshoptimizer-dev, libpng-dev, nlohmann-json3-dev, pkg-config")
 include(CPack)
