@@ -1,0 +1,270 @@
+#include "mesh/smooth_basis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "mesh/connectivity.h"
+#include "mesh/dense_kernels.h"
+#include "mesh/laplacian.h"
+#include "mesh/sparse_solver.h"
+
+namespace kinespace {
+namespace {
+
+constexpr double regularisation = 1e-6;  // e, in mean diagonals of S
+
+// S + e I. Sums are written out: a library's mean adds up in an order of its own.
+SparseMatrix regularised(SparseMatrix stiffness) {
+  double trace = 0;
+  for (Eigen::Index v = 0; v < stiffness.rows(); ++v) trace += stiffness.coeff(v, v);
+  const double mean = trace / static_cast<double>(stiffness.rows());
+  for (Eigen::Index v = 0; v < stiffness.rows(); ++v) {
+    stiffness.coeffRef(v, v) += regularisation * (mean > 0 ? mean : 1);
+  }
+  return stiffness;
+}
+
+// Grows an orthonormal basis by blocks of functions around new anchors.
+class Builder {
+ public:
+  Builder(const Points& points, std::span<const Triangle> triangles, const SmoothBasisOptions& options)
+      : vertices_(points.rows()),
+        functions_(options.functions),
+        order_(options.order),
+        neighbours_(static_cast<int>(points.rows()), triangles),
+        components_(connected_components(neighbours_)),
+        solver_(regularised(cotangent_stiffness(points, triangles))),
+        basis_(static_cast<std::size_t>(vertices_ * functions_)),
+        residual_(static_cast<std::size_t>(vertices_ * 3)),
+        used_(static_cast<std::size_t>(vertices_)),
+        near_(static_cast<std::size_t>(vertices_)),
+        seen_(static_cast<std::size_t>(vertices_)) {
+    for (Eigen::Index v = 0; v < vertices_; ++v) {
+      for (Eigen::Index c = 0; c < 3; ++c) residual_[static_cast<std::size_t>(3 * v + c)] = points(v, c);
+    }
+  }
+
+  SmoothBasis build() && {
+    add_constants();
+    const int step = 8 * ((functions_ + 255) / 256);
+    while (count_ < functions_) add_functions(choose(std::min(step, functions_ - count_)));
+    SmoothBasis out;
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    out.functions = Eigen::Map<const RowMajor>(basis_.data(), vertices_, functions_);
+    out.anchors = std::move(anchors_);
+    return out;
+  }
+
+ private:
+  [[nodiscard]] Rows columns_from(int k) { return {basis_.data() + k, functions_}; }
+  [[nodiscard]] ConstRows found() const { return {basis_.data(), functions_}; }
+
+  void add_constants() {
+    std::vector<std::int64_t> size(static_cast<std::size_t>(components_.count));
+    for (const std::int32_t c : components_.of) ++size[static_cast<std::size_t>(c)];
+    std::vector<std::size_t> largest(size.size());
+    std::iota(largest.begin(), largest.end(), std::size_t{0});
+    std::stable_sort(largest.begin(), largest.end(), [&](std::size_t a, std::size_t b) { return size[a] > size[b]; });
+    largest.resize(std::min(largest.size(), static_cast<std::size_t>(functions_)));
+    std::vector<int> column(size.size(), -1);
+    for (std::size_t i = 0; i < largest.size(); ++i) column[largest[i]] = static_cast<int>(i);
+    for (Eigen::Index v = 0; v < vertices_; ++v) {
+      const auto c = static_cast<std::size_t>(components_.of[static_cast<std::size_t>(v)]);
+      if (column[c] >= 0) columns_from(column[c]).data[v * functions_] = 1 / std::sqrt(static_cast<double>(size[c]));
+    }
+    take_into_basis(static_cast<int>(largest.size()));
+  }
+
+  // The next `columns` of the basis are done: what they hold of the mesh leaves the residual.
+  void take_into_basis(int columns) {
+    std::vector<double> held(static_cast<std::size_t>(columns) * 3);
+    const ConstRows added{basis_.data() + count_, functions_};
+    transposed_product(vertices_, columns, 3, added, {residual_.data(), 3}, {held.data(), 3});
+    subtract_product(vertices_, columns, 3, added, {held.data(), 3}, {residual_.data(), 3});
+    count_ += columns;
+  }
+
+  [[nodiscard]] std::vector<std::int32_t> choose(int wanted) {
+    std::vector<double> distance(static_cast<std::size_t>(vertices_));
+    for (std::size_t v = 0; v < distance.size(); ++v) {
+      const double* const r = residual_.data() + 3 * v;
+      distance[v] = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+    }
+    std::vector<std::int32_t> order(static_cast<std::size_t>(vertices_));
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
+      const double da = distance[static_cast<std::size_t>(a)], db = distance[static_cast<std::size_t>(b)];
+      return da != db ? da > db : a < b;
+    });
+    std::vector<std::int32_t> out;
+    std::fill(near_.begin(), near_.end(), false);
+    for (const bool keep_apart : {true, false}) {
+      for (const std::int32_t v : order) {
+        if (static_cast<int>(out.size()) == wanted) return out;
+        if (used_[static_cast<std::size_t>(v)] || (keep_apart && near_[static_cast<std::size_t>(v)])) continue;
+        used_[static_cast<std::size_t>(v)] = true;
+        out.push_back(v);
+        mark_around(v, wanted);
+      }
+    }
+    return out;
+  }
+
+  // Marks what is closer to v than three quarters of the distance at which as many anchors as there are now would lie
+  // evenly.
+  void mark_around(std::int32_t v, int wanted) {
+    const double apart = std::sqrt(static_cast<double>(vertices_) / (count_ + wanted));
+    const int rings = std::max(2, static_cast<int>(0.75 * apart));
+    ring_.assign(1, v);
+    std::fill(seen_.begin(), seen_.end(), false);
+    seen_[static_cast<std::size_t>(v)] = true;
+    for (int r = 0; r < rings; ++r) {
+      next_ring_.clear();
+      for (const std::int32_t a : ring_) {
+        for (const std::int32_t b : neighbours_.of(a)) {
+          if (seen_[static_cast<std::size_t>(b)]) continue;
+          seen_[static_cast<std::size_t>(b)] = near_[static_cast<std::size_t>(b)] = true;
+          next_ring_.push_back(b);
+        }
+      }
+      ring_.swap(next_ring_);
+    }
+  }
+
+  void add_functions(const std::vector<std::int32_t>& anchors) {
+    const int columns = static_cast<int>(anchors.size());
+    block_.assign(static_cast<std::size_t>(vertices_ * columns), 0.0);
+    for (int c = 0; c < columns; ++c) {
+      block_[static_cast<std::size_t>(anchors[static_cast<std::size_t>(c)]) * static_cast<std::size_t>(columns) +
+             static_cast<std::size_t>(c)] = 1;
+    }
+    for (int p = 0; p < order_; ++p) {
+      remove_means(columns);
+      solver_.solve(block_.data(), columns, scratch_);
+    }
+    remove_means(columns);
+    for (int c = 0; c < columns; ++c) scale_to_unit(c, columns);
+    orthogonalise_to_basis(columns);
+    for (int c = 0; c < columns; ++c) scale_to_unit(c, columns);
+    orthogonalise_to_basis(columns);
+    for (int c = 0; c < columns; ++c) orthogonalise_in_block(c, columns, anchors[static_cast<std::size_t>(c)]);
+    for (Eigen::Index v = 0; v < vertices_; ++v) {
+      std::copy_n(block_.data() + v * columns, columns, basis_.data() + v * functions_ + count_);
+    }
+    take_into_basis(columns);
+    anchors_.insert(anchors_.end(), anchors.begin(), anchors.end());
+  }
+
+  // Constants are in the basis already, and would swamp what else a solution holds.
+  void remove_means(int columns) {
+    std::vector<double> sum(static_cast<std::size_t>(components_.count * columns)), size(sum.size());
+    const auto place = [&](Eigen::Index v, int c) {
+      return static_cast<std::size_t>(components_.of[static_cast<std::size_t>(v)] * columns + c);
+    };
+    for (Eigen::Index v = 0; v < vertices_; ++v) {
+      for (int c = 0; c < columns; ++c) {
+        sum[place(v, c)] += block_[static_cast<std::size_t>(v * columns + c)];
+        size[place(v, c)] += 1;
+      }
+    }
+    for (Eigen::Index v = 0; v < vertices_; ++v) {
+      for (int c = 0; c < columns; ++c) {
+        block_[static_cast<std::size_t>(v * columns + c)] -= sum[place(v, c)] / size[place(v, c)];
+      }
+    }
+  }
+
+  [[nodiscard]] double dot_in_block(int a, int b, int columns) const {
+    double sum = 0;
+    for (Eigen::Index v = 0; v < vertices_; ++v) {
+      const double* const row = block_.data() + v * columns;
+      sum += row[a] * row[b];
+    }
+    return sum;
+  }
+
+  // Returns the length before. A column of no length stays as it is.
+  double scale_to_unit(int c, int columns) {
+    const double length = std::sqrt(dot_in_block(c, c, columns));
+    if (length > 0) {
+      for (Eigen::Index v = 0; v < vertices_; ++v) block_[static_cast<std::size_t>(v * columns + c)] /= length;
+    }
+    return length;
+  }
+
+  void orthogonalise_to_basis(int columns) {
+    held_.resize(static_cast<std::size_t>(count_ * columns));
+    transposed_product(vertices_, count_, columns, found(), {block_.data(), columns}, {held_.data(), columns});
+    subtract_product(vertices_, count_, columns, found(), {held_.data(), columns}, {block_.data(), columns});
+  }
+
+  // Makes column c a unit vector orthogonal to the columns before it. What little is left of a column that depends on
+  // the others is rounding: the unit impulse at its anchor, and then at other vertices, takes its place.
+  void orthogonalise_in_block(int c, int columns, std::int32_t anchor) {
+    constexpr double lost = 1e-6;
+    subtract_earlier(c, columns);
+    bool good = scale_to_unit(c, columns) > lost;
+    for (std::int32_t tried = 0; !good && tried < vertices_; ++tried) {
+      const Eigen::Index at = (anchor + tried) % vertices_;
+      for (Eigen::Index v = 0; v < vertices_; ++v) block_[static_cast<std::size_t>(v * columns + c)] = v == at ? 1 : 0;
+      orthogonalise_to_basis(columns);
+      subtract_earlier(c, columns);
+      good = scale_to_unit(c, columns) > lost;
+    }
+    orthogonalise_column_again(c, columns);
+  }
+
+  void subtract_earlier(int c, int columns) {
+    for (int b = 0; b < c; ++b) {
+      const double share = dot_in_block(b, c, columns);
+      for (Eigen::Index v = 0; v < vertices_; ++v) {
+        double* const row = block_.data() + v * columns;
+        row[c] -= share * row[b];
+      }
+    }
+  }
+
+  void orthogonalise_column_again(int c, int columns) {
+    held_.resize(static_cast<std::size_t>(count_));
+    transposed_product(vertices_, count_, 1, found(), {block_.data() + c, columns}, {held_.data(), 1});
+    subtract_product(vertices_, count_, 1, found(), {held_.data(), 1}, {block_.data() + c, columns});
+    subtract_earlier(c, columns);
+    scale_to_unit(c, columns);
+  }
+
+  Eigen::Index vertices_;
+  int functions_, order_, count_ = 0;
+  Neighbours neighbours_;
+  Components components_;
+  SparseSolver solver_;
+  std::vector<double> basis_;     // by rows
+  std::vector<double> residual_;  // of the mesh, by rows
+  std::vector<bool> used_, near_, seen_;
+  std::vector<std::int32_t> ring_, next_ring_;
+  std::vector<std::int32_t> anchors_;
+  std::vector<double> block_, held_, scratch_;
+};
+
+}  // namespace
+
+void SmoothBasisOptions::validate(int vertices) const {
+  const auto fail = [](const char* field, int value, const std::string& range) {
+    throw Error(ErrorKind::usage, {.found = fmt::format("{} = {}", field, value), .expected = range});
+  };
+  if (functions < 1 || functions > vertices) {
+    fail("functions", functions, fmt::format("1 to {}, the number of vertices", vertices));
+  }
+  if (order < 1 || order > 4) fail("order", order, "1 to 4");
+}
+
+SmoothBasis smooth_basis(const Points& points, std::span<const Triangle> triangles, const SmoothBasisOptions& options) {
+  options.validate(static_cast<int>(points.rows()));
+  return Builder(points, triangles, options).build();
+}
+
+}  // namespace kinespace
