@@ -1,7 +1,7 @@
 #include "mesh/projection.h"
 
 #include <algorithm>
-#include <array>
+#include <cmath>
 
 #include <Eigen/QR>
 
@@ -10,54 +10,78 @@
 namespace kinespace {
 namespace {
 
-constexpr int block = 512;  // vertices: their three sums stay in the first cache
-constexpr int lanes = 8;    // sums side by side, added up in one order
+constexpr int block = 64;  // vertices; the last block is filled up with zeros
+constexpr int lanes = 8;   // sums side by side: vectors run along them, and their order is the same everywhere
 
 struct Shape {
   int vertices, functions;
 };
 
-KINESPACE_VECTOR_CLONES
-void add_product(Shape shape, const float* blocks, const double* c, int rows, int c_stride, double* x) {
-  std::array<double, block> sum;
-  for (int first = 0; first < shape.vertices; first += block) {
+// Three coordinates of up to `block` vertices, zeros behind them.
+struct Tile {
+  double x[3][block] = {};
+
+  void load(const Shape& shape, const double* points, int first) {
     const int count = std::min(block, shape.vertices - first);
-    const float* const u = blocks + static_cast<std::ptrdiff_t>(first) * shape.functions;
     for (int d = 0; d < 3; ++d) {
-      std::fill_n(sum.begin(), count, 0.0);
-      for (int k = 0; k < rows; ++k) {
-        const double weight = c[k + static_cast<std::ptrdiff_t>(d) * c_stride];
-        const float* const function = u + static_cast<std::ptrdiff_t>(k) * count;
-        for (int v = 0; v < count; ++v) sum[static_cast<std::size_t>(v)] += weight * static_cast<double>(function[v]);
-      }
-      double* const out = x + static_cast<std::ptrdiff_t>(d) * shape.vertices + first;
-      for (int v = 0; v < count; ++v) out[v] += sum[static_cast<std::size_t>(v)];
+      const double* const in = points + static_cast<std::ptrdiff_t>(d) * shape.vertices + first;
+      std::fill(std::copy_n(in, count, x[d]), x[d] + block, 0.0);
     }
+  }
+  void store(const Shape& shape, double* points, int first) const {
+    const int count = std::min(block, shape.vertices - first);
+    for (int d = 0; d < 3; ++d)
+      std::copy_n(x[d], count, points + static_cast<std::ptrdiff_t>(d) * shape.vertices + first);
+  }
+};
+
+// `c`: the three coefficients of each function, one after the other.
+KINESPACE_VECTOR_CLONES
+void add_product(Shape shape, const float* blocks, const double* c, int rows, double* x) {
+  Tile tile;
+  for (int first = 0; first < shape.vertices; first += block) {
+    const float* const u = blocks + static_cast<std::ptrdiff_t>(first) * shape.functions;
+    tile.load(shape, x, first);
+    for (int part = 0; part < block; part += lanes) {
+      double sum[3][lanes] = {};
+      for (int k = 0; k < rows; ++k) {
+        const float* const function = u + static_cast<std::ptrdiff_t>(k) * block + part;
+        for (int d = 0; d < 3; ++d) {
+          for (int l = 0; l < lanes; ++l) sum[d][l] += c[3 * k + d] * static_cast<double>(function[l]);
+        }
+      }
+      for (int d = 0; d < 3; ++d) {
+        for (int l = 0; l < lanes; ++l) tile.x[d][part + l] += sum[d][l];
+      }
+    }
+    tile.store(shape, x, first);
   }
 }
 
 KINESPACE_VECTOR_CLONES
 void add_correlations(Shape shape, const float* blocks, const double* x, double* c) {
+  Tile tile;
   for (int first = 0; first < shape.vertices; first += block) {
-    const int count = std::min(block, shape.vertices - first);
     const float* const u = blocks + static_cast<std::ptrdiff_t>(first) * shape.functions;
+    tile.load(shape, x, first);
     for (int k = 0; k < shape.functions; ++k) {
-      const float* const function = u + static_cast<std::ptrdiff_t>(k) * count;
-      for (int d = 0; d < 3; ++d) {
-        const double* const in = x + static_cast<std::ptrdiff_t>(d) * shape.vertices + first;
-        double sum[lanes] = {};
-        int v = 0;
-        for (; v + lanes <= count; v += lanes) {
-          for (int l = 0; l < lanes; ++l) sum[l] += static_cast<double>(function[v + l]) * in[v + l];
+      const float* const function = u + static_cast<std::ptrdiff_t>(k) * block;
+      double sum[3][lanes] = {};
+      for (int part = 0; part < block; part += lanes) {
+        for (int d = 0; d < 3; ++d) {
+          for (int l = 0; l < lanes; ++l) sum[d][l] += static_cast<double>(function[part + l]) * tile.x[d][part + l];
         }
+      }
+      for (int d = 0; d < 3; ++d) {
         double all = 0;
-        for (const double part : sum) all += part;
-        for (; v < count; ++v) all += static_cast<double>(function[v]) * in[v];
-        c[k + static_cast<std::ptrdiff_t>(d) * shape.functions] += all;
+        for (const double one : sum[d]) all += one;
+        c[3 * k + d] += all;
       }
     }
   }
 }
+
+using ByFunction = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
 bool orthonormal(const Eigen::MatrixXd& u) {
   for (Eigen::Index k = 0; k < u.cols(); ++k) {
@@ -78,18 +102,20 @@ Projection::Projection(const Eigen::MatrixXd& functions)
     made = qr.householderQ() * Eigen::MatrixXd::Identity(functions.rows(), functions.cols());
   }
   const Eigen::MatrixXd& u = as_they_are ? functions : made;
-  blocks_.resize(static_cast<std::size_t>(u.size()));
-  float* out = blocks_.data();
+  const int blocks = (vertices_ + block - 1) / block;
+  blocks_.resize(static_cast<std::size_t>(blocks) * block * static_cast<std::size_t>(functions_));
   for (int first = 0; first < vertices_; first += block) {
+    float* const out = blocks_.data() + static_cast<std::ptrdiff_t>(first) * functions_;
     const int count = std::min(block, vertices_ - first);
     for (int k = 0; k < functions_; ++k) {
-      for (int v = 0; v < count; ++v) *out++ = static_cast<float>(u(first + v, k));
+      for (int v = 0; v < count; ++v)
+        out[static_cast<std::ptrdiff_t>(k) * block + v] = static_cast<float>(u(first + v, k));
     }
   }
 }
 
 Coefficients Projection::correlations(const Points& x) const {
-  Coefficients c = Coefficients::Zero(functions_, 3);
+  ByFunction c = ByFunction::Zero(functions_, 3);
   add_correlations({vertices_, functions_}, blocks_.data(), x.data(), c.data());
   return c;
 }
@@ -100,8 +126,9 @@ Coefficients Projection::coefficients(const Points& x) const {
 }
 
 void Projection::add(const Coefficients& c, Points& x) const {
+  const ByFunction by_function = c;
   const int rows = std::min(static_cast<int>(c.rows()), functions_);
-  add_product({vertices_, functions_}, blocks_.data(), c.data(), rows, static_cast<int>(c.rows()), x.data());
+  add_product({vertices_, functions_}, blocks_.data(), by_function.data(), rows, x.data());
 }
 
 Points Projection::synthesise(const Coefficients& c) const {

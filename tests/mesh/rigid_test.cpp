@@ -38,7 +38,9 @@ TEST(NearestRotation, is_that_of_the_singular_value_decomposition) {
     EXPECT_GT(r.determinant(), 0.99);
     const Eigen::Vector3d d = Eigen::JacobiSVD<Eigen::Matrix3d>(m).singularValues();
     const double gap = d[1] + (m.determinant() < 0 ? -d[2] : d[2]);  // to the second best rotation
-    if (gap > 0.01 * m.norm()) EXPECT_LT((r - s).norm(), 1e-6) << m;
+    if (gap > 0.01 * m.norm()) {
+      EXPECT_LT((r - s).norm(), 1e-6) << m;
+    }
   }
 }
 
