@@ -204,7 +204,7 @@ void put_contacts(ValueWriter& out, std::span<const ContactCode> codes) {
   }
 }
 
-std::vector<ContactCode> get_contacts(ValueReader& in, int frames, int joints) {
+std::vector<ContactCode> get_contacts(ValueReader& in, int frames, int joints, std::int64_t& numbers) {
   std::vector<ContactCode> out;
   const std::int64_t codes = in.get_between(0, static_cast<std::int64_t>(frames) * joints, count);
   int last_joint = 0;
@@ -216,7 +216,8 @@ std::vector<ContactCode> get_contacts(ValueReader& in, int frames, int joints) {
     if (code.joint != last_joint) last_frame = 0;
     code.first = static_cast<int>(last_frame + in.get_between(0, frames, first_frame));
     const std::int64_t size = 1 + in.get_between(0, frames, length);
-    if (code.first + size > frames) in.damaged();
+    numbers -= 16 + size;
+    if (code.first + size > frames || numbers < 0) in.damaged();
     for (int k = 0; k < 3; ++k) {
       constexpr int most = ContactCode::farthest_start;
       code.start[static_cast<std::size_t>(k)] = static_cast<std::int8_t>(in.get_between(-most, most, start_x + k));

@@ -66,8 +66,8 @@ struct ContactCode {
 // Contexts that these take of a ValueWriter, from 0 on.
 inline constexpr int contact_contexts = 24;
 void put_contacts(ValueWriter& out, std::span<const ContactCode> codes);
-// `frames` and `joints`: of the clip.
-[[nodiscard]] std::vector<ContactCode> get_contacts(ValueReader& in, int frames, int joints);
+// `frames` and `joints`: of the clip. Takes what it holds off `numbers`, and throws when that is not enough.
+[[nodiscard]] std::vector<ContactCode> get_contacts(ValueReader& in, int frames, int joints, std::int64_t& numbers);
 
 // The world positions of a joint, cm, in frames [first, first + count).
 [[nodiscard]] std::vector<Eigen::Vector3d> joint_path(const Clip& clip, int joint, int first, int count);

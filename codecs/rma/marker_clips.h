@@ -1,0 +1,24 @@
+// From decoded markers and alignment to a clip: what the streams of markers share.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "codecs/clip_error.h"
+#include "codecs/clip_table.h"
+#include "codecs/rma/contact_trajectories.h"
+#include "codecs/rma/markers.h"
+#include "codecs/rma/root_alignment.h"
+
+namespace kinespace {
+
+// Writes the posture that `markers(frame, out)` gives for every frame, in rising order, in the frames of `alignment`.
+[[nodiscard]] Clip clip_from_markers(const ClipEntry& entry, const Skeleton& skeleton, const MarkerRig& rig,
+                                     const ReferencePose& reference, const RootAlignment& alignment,
+                                     const std::function<void(int, std::span<double>)>& markers);
+
+// The table of clips as streams of markers have it: names, skeletons, rates, lengths, placements, side tracks.
+[[nodiscard]] ClipTable marker_clip_table(std::span<const Clip> clips, const AlignedClips& aligned);
+
+}  // namespace kinespace
