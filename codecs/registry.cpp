@@ -6,6 +6,9 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "codecs/baselines/channel_codec.h"
+#include "codecs/baselines/channel_transform.h"
+#include "codecs/baselines/raw_codec.h"
 #include "codecs/motion_space_codec.h"
 
 namespace kinespace {
@@ -81,7 +84,11 @@ double Codec::setting(const CodecOptions& options, std::string_view name) const 
 
 std::span<const Codec* const> all_codecs() {
   static const MotionSpaceCodec motion_space;
-  static const std::array<const Codec*, 1> codecs{&motion_space};
+  static const ChannelCodec pca(pca_transform()), dwt(dwt_transform()), awt(awt_transform());
+  static const ChannelCodec fourier(fourier_transform()), legendre(legendre_transform());
+  static const RawCodec raw_zstd(Packer::zstd), raw_xz(Packer::xz);
+  static const std::array<const Codec*, 8> codecs{&motion_space, &pca,      &dwt,      &awt,
+                                                  &fourier,      &legendre, &raw_zstd, &raw_xz};
   return codecs;
 }
 

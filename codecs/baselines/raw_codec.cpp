@@ -1,0 +1,210 @@
+#include "codecs/baselines/raw_codec.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "base/error.h"
+#include "codecs/baselines/packers.h"
+#include "codecs/baselines/stream_parts.h"
+#include "codecs/clip_table.h"
+#include "codecs/joint_channels.h"
+#include "codecs/registry.h"
+#include "fpca/curves.h"
+#include "storage/varint.h"
+
+namespace kinespace {
+namespace {
+
+constexpr std::array zstd_settings{CodecSetting{"level", 19, 1, highest_zstd_level, "zstandard's level"}};
+constexpr std::array xz_settings{CodecSetting{"level", 6, 0, highest_xz_level, "xz's preset"}};
+constexpr std::size_t planes = sizeof(float);
+
+// Three turns for every joint, in its parent's frame.
+ChannelLayout plain_layout(const Skeleton& skeleton) {
+  ChannelLayout out;
+  int channel = 3;
+  for (const int joint : skeleton.rotating_joints()) {
+    JointFreedom freedom{.joint = joint, .turns = 3};
+    freedom.first_channel = channel;
+    channel += 3;
+    out.joints.push_back(freedom);
+  }
+  return out;
+}
+
+// A float's bits as a number that grows with the float, and back.
+std::uint32_t ordered(float value) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  return (bits & 0x80000000U) != 0 ? ~bits : bits | 0x80000000U;
+}
+float unordered(std::uint32_t number) {
+  return std::bit_cast<float>((number & 0x80000000U) != 0 ? number & 0x7fffffffU : ~number);
+}
+// Small differences of either sign as small numbers.
+std::uint32_t folded(std::uint32_t difference) {
+  return (difference << 1) ^ ((difference & 0x80000000U) != 0 ? 0xffffffffU : 0U);
+}
+std::uint32_t unfolded(std::uint32_t number) {
+  return (number >> 1) ^ ((number & 1U) != 0 ? 0xffffffffU : 0U);
+}
+
+// [plane][channel][frame].
+Bytes to_planes(const ChannelCurves& curves) {
+  const std::size_t count = curves.values.size();
+  Bytes out(planes * count);
+  std::uint32_t last = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t now = ordered(static_cast<float>(curves.values[i]));
+    const std::uint32_t number = folded(now - last);
+    last = now;
+    for (std::size_t p = 0; p < planes; ++p) out[p * count + i] = static_cast<std::byte>(number >> (24 - 8 * p));
+  }
+  return out;
+}
+
+void from_planes(std::span<const std::byte> bytes, std::span<double> values, const std::string& source) {
+  std::uint32_t last = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    std::uint32_t number = 0;
+    for (std::size_t p = 0; p < planes; ++p) {
+      number = (number << 8) | static_cast<std::uint32_t>(bytes[p * values.size() + i]);
+    }
+    last += unfolded(number);
+    values[i] = unordered(last);
+    if (!(std::abs(values[i]) < 2 * largest_channel_value)) {
+      throw Error(ErrorKind::bad_input, {.file = source,
+                                         .found = "channels that are no numbers or huge",
+                                         .expected = "what the encoder writes (damaged)"});
+    }
+  }
+}
+
+class RawReader final : public StreamReader {
+ public:
+  RawReader(Packer packer, Bitstream stream)
+      : packer_(packer),
+        stream_(std::move(stream)),
+        table_(unpack_clip_table(stream_.section("clips"), most_frames_of(stream_.size()), stream_.source())),
+        layout_(plain_layout(table_.skeletons.front())) {
+    ByteReader in(stream_.section("channels"), stream_.source());
+    std::vector<std::size_t> sizes;
+    for (std::size_t c = 0; c < table_.clips.size(); ++c) sizes.push_back(get_count(in, 1, "bytes of a clip"));
+    for (const std::size_t size : sizes) packed_.push_back(in.take(size));
+    in.expect_end();
+    for (const ClipEntry& clip : table_.clips) summaries_.push_back({clip.name, clip.rate_hz, clip.frames});
+  }
+
+  [[nodiscard]] const Bitstream& stream() const override { return stream_; }
+  [[nodiscard]] std::span<const ClipSummary> clips() const override { return summaries_; }
+  [[nodiscard]] const Skeleton& skeleton(std::size_t clip) const override {
+    return table_.skeletons[static_cast<std::size_t>(table_.clips[clip].skeleton)];
+  }
+
+  [[nodiscard]] Clip decode(std::size_t clip, int first, int count, int /*level*/) const override {
+    require_frames(*this, clip, first, count);
+    const ClipEntry& entry = table_.clips[clip];
+    Clip out = make_clip(entry.name, skeleton(clip), entry.rate_hz, entry.frames);
+    out.require_translation_track(out.skeleton.travel_root());
+    for (const SideTrack& track : entry.side_tracks) apply_side_track(track, 0, out);
+    std::vector<double> values(static_cast<std::size_t>(layout_.channel_count()) *
+                               static_cast<std::size_t>(entry.frames));
+    from_planes(unpack_bytes(packer_, packed_[clip], planes * values.size(), stream_.source()), values,
+                stream_.source());
+    write_channels(layout_, values, 0, entry.frames, out);
+    return first == 0 && count == entry.frames ? out : slice(out, first, count);
+  }
+
+  [[nodiscard]] std::vector<Clip> decode_all(int level) const override {
+    std::vector<Clip> out(summaries_.size());
+    tbb::parallel_for(std::size_t{0}, out.size(),
+                      [&](std::size_t c) { out[c] = decode(c, 0, summaries_[c].frames, level); });
+    return out;
+  }
+
+ private:
+  Packer packer_;
+  Bitstream stream_;
+  ClipTable table_;
+  ChannelLayout layout_;
+  std::vector<std::span<const std::byte>> packed_;  // by clip
+  std::vector<ClipSummary> summaries_;
+};
+
+ClipTable table_of(std::span<const Clip> clips) {
+  ClipTable out;
+  for (const Clip& clip : clips) {
+    ClipEntry entry{.name = clip.name,
+                    .skeleton = out.add_skeleton(clip.skeleton, clip.name),
+                    .rate_hz = clip.rate_hz,
+                    .frames = clip.frames};
+    fill_blocks(entry);
+    entry.side_tracks = clip_curves(clip).side_tracks;
+    out.clips.push_back(std::move(entry));
+  }
+  return out;
+}
+
+void require_met(const CodecTarget& target, const MeasuredError& error, std::size_t size) {
+  const bool met = (!target.mean_error_cm || error.mean_joint_error_cm <= *target.mean_error_cm) &&
+                   (!target.max_error_cm || error.max_joint_error_cm <= *target.max_error_cm) &&
+                   (!target.bytes || static_cast<std::int64_t>(size) <= *target.bytes);
+  if (met) return;
+  throw Error(
+      ErrorKind::usage,
+      {.found = fmt::format("a target that cannot be met: lossless, the clips take {} bytes and are off by {} cm", size,
+                            error.max_joint_error_cm),
+       .expected = "a codec that can be lossy, or another target"});
+}
+
+}  // namespace
+
+std::string_view RawCodec::name() const {
+  return packer_ == Packer::zstd ? "raw+zstd" : "raw+xz";
+}
+
+std::span<const CodecSetting> RawCodec::settings() const {
+  if (packer_ == Packer::zstd) return zstd_settings;
+  return xz_settings;
+}
+
+Bytes RawCodec::encode(std::span<const Clip> clips, const CodecOptions& options) const {
+  const int level = static_cast<int>(setting(options, "level"));
+  const ClipTable table = table_of(clips);
+  const ChannelLayout layout = plain_layout(clips.front().skeleton);
+  std::vector<Bytes> packed(clips.size());
+  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
+    options.progress.check_stop();
+    const ChannelCurves curves = channel_curves(clips[c], layout);
+    require_encodable(curves, clips[c].name);
+    packed[c] = pack_bytes(packer_, level, to_planes(curves));
+  });
+  ByteWriter channels;
+  for (const Bytes& clip : packed) put_varint(channels, clip.size());
+  for (const Bytes& clip : packed) channels.put_bytes(clip);
+  const auto write = [&](const MeasuredError& error) {
+    BitstreamWriter out(stream_kind(name()));
+    out.set_error(error);
+    const Bytes clip_bytes = pack_clip_table(table);
+    const std::size_t size = clip_bytes.size() + channels.size();
+    out.add_section("clips", clip_bytes);
+    out.add_section("channels", channels.bytes());
+    add_padding(table.frames(), size, out);
+    return out.finish();
+  };
+  const Bytes draft = write({});
+  const MeasuredError error = measure_error(clips, *open(Bitstream::parse(draft, "the stream")));
+  Bytes out = write(error);
+  require_met(options.target, error, out.size());
+  return out;
+}
+
+std::unique_ptr<StreamReader> RawCodec::open(Bitstream stream) const {
+  stream.require_kind(stream_kind(name()));
+  return std::make_unique<RawReader>(packer_, std::move(stream));
+}
+
+}  // namespace kinespace
