@@ -81,6 +81,16 @@ class StreamReader {
   // All clips, several at a time.
   [[nodiscard]] virtual std::vector<Clip> decode_all(int level) const = 0;
 
+  // Whether one joint can be decoded from its own bytes alone.
+  [[nodiscard]] virtual bool decodes_joints() const { return false; }
+  // Frames [first, first + count) of one joint (an index of skeleton(clip)): a clip in which the others keep their rest
+  // pose, but for those above the travel root. Throws Error{usage} when the codec cannot, or there is no such joint.
+  [[nodiscard]] virtual Clip decode_joint(std::size_t clip, int joint, int first, int count) const;
+  // The frames that can be shown without decoding what lies between them, ascending; empty when there are none.
+  [[nodiscard]] virtual std::vector<int> preview_frames(std::size_t /*clip*/) const { return {}; }
+  // Those frames as a clip. Throws Error{usage} when there are none.
+  [[nodiscard]] virtual Clip decode_preview(std::size_t clip) const;
+
   [[nodiscard]] Clip decode(std::size_t clip, int level = -1) const {
     return decode(clip, 0, clips()[clip].frames, level);
   }

@@ -10,6 +10,7 @@
 #include "codecs/baselines/channel_transform.h"
 #include "codecs/baselines/raw_codec.h"
 #include "codecs/motion_space_codec.h"
+#include "codecs/qbc_codec.h"
 
 namespace kinespace {
 namespace {
@@ -64,6 +65,18 @@ void CodecTarget::validate() const {
   }
 }
 
+Clip StreamReader::decode_joint(std::size_t /*clip*/, int /*joint*/, int /*first*/, int /*count*/) const {
+  throw Error(ErrorKind::usage, {.file = stream().source(),
+                                 .found = "a stream whose joints lie together",
+                                 .expected = "one of a codec that keeps them apart, as qbc"});
+}
+
+Clip StreamReader::decode_preview(std::size_t /*clip*/) const {
+  throw Error(ErrorKind::usage, {.file = stream().source(),
+                                 .found = "a stream without preview frames",
+                                 .expected = "one of a codec that has them, as qbc"});
+}
+
 std::size_t StreamReader::find(std::string_view name) const {
   for (std::size_t i = 0; i < clips().size(); ++i) {
     if (clips()[i].name == name) return i;
@@ -86,8 +99,9 @@ std::span<const Codec* const> all_codecs() {
   static const MotionSpaceCodec motion_space;
   static const ChannelCodec pca(pca_transform()), dwt(dwt_transform()), awt(awt_transform());
   static const ChannelCodec fourier(fourier_transform()), legendre(legendre_transform());
+  static const QbcCodec qbc;
   static const RawCodec raw_zstd(Packer::zstd), raw_xz(Packer::xz);
-  static const std::array<const Codec*, 8> codecs{&motion_space, &pca,      &dwt,      &awt,
+  static const std::array<const Codec*, 9> codecs{&motion_space, &qbc,      &pca,      &dwt,      &awt,
                                                   &fourier,      &legendre, &raw_zstd, &raw_xz};
   return codecs;
 }
