@@ -13,6 +13,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "codecs/library_basis.h"
 #include "codecs/registry.h"
 #include "motion/read.h"
 
@@ -27,6 +28,7 @@ struct DecodeOptions {
   std::optional<std::string> clip;
   std::optional<double> from_s;
   std::optional<double> to_s;
+  std::optional<fs::path> basis;  // a library
   int level = -1;
   std::string format = ".bvh";
   bool json = false;
@@ -98,7 +100,10 @@ std::vector<fs::path> output_files(const std::vector<Clip>& clips, const DecodeO
 void run_decode(const DecodeOptions& options) {
   const MappedFile file(options.stream);
   const auto start = std::chrono::steady_clock::now();
-  const auto reader = open_stream(file.bytes(), options.stream.string());
+  std::optional<MotionSpaceBasis> basis;
+  const std::string id = basis_of(file.bytes(), options.stream.string());
+  if (options.basis && !id.empty()) basis = library_basis_by_id(*options.basis, id);
+  const auto reader = open_stream(file.bytes(), options.stream.string(), basis ? &*basis : nullptr);
   const std::vector<Clip> clips = decode_clips(*reader, options);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::vector<fs::path> files = output_files(clips, options);
@@ -126,6 +131,7 @@ void add_decode(CLI::App& app, Session& /*session*/) {
   command->add_option("--clip", options->clip, "Only the clip of that name");
   command->add_option("--from", options->from_s, "From this time on, in seconds")->check(CLI::NonNegativeNumber);
   command->add_option("--to", options->to_s, "Up to this time, in seconds")->check(CLI::NonNegativeNumber);
+  command->add_option("--basis", options->basis, "The library that the stream was encoded with, if it was with one");
   command->add_option("--level", options->level, "Only so many levels of detail")->check(CLI::NonNegativeNumber);
   command->add_option("--format", options->format, "Ending of the files in a folder")
       ->check(CLI::IsMember({".bvh", ".amc", ".glb", ".gltf"}));

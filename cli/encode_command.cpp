@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "codecs/library_basis.h"
 #include "codecs/registry.h"
 #include "motion/read.h"
 
@@ -26,6 +28,7 @@ struct EncodeOptions {
   fs::path output;
   std::string codec = "motion-space";
   CodecTarget target;
+  std::optional<fs::path> basis;      // a library
   std::vector<std::string> settings;  // NAME=VALUE
   bool json = false;
 };
@@ -95,8 +98,15 @@ double raw_bytes(const std::vector<Clip>& clips) {
 void run_encode(const EncodeOptions& options, Session& session) {
   const Progress progress = session.progress();
   const std::vector<Clip> clips = read_clips(input_files(options.inputs), options.output, progress);
-  const CodecOptions codec_options{
-      .target = options.target, .settings = parse_settings(options.settings), .progress = progress};
+  std::optional<MotionSpaceBasis> basis;
+  if (options.basis) {
+    require_different_files(*options.basis, options.output);
+    basis = library_basis(*options.basis, clips.front().skeleton.tree_hash(), progress);
+  }
+  const CodecOptions codec_options{.target = options.target,
+                                   .basis = basis ? &*basis : nullptr,
+                                   .settings = parse_settings(options.settings),
+                                   .progress = progress};
   const auto start = std::chrono::steady_clock::now();
   const Bytes stream = encode(options.codec, clips, codec_options);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -151,6 +161,9 @@ void add_encode(CLI::App& app, Session& session) {
   target->add_option("--max-error", options->target.max_error_cm, "Largest joint error of any frame, in cm");
   target->add_option("--bytes", options->target.bytes, "Size to keep to");
   target->require_option(0, 1);
+  command->add_option("--basis", options->basis,
+                      "A library whose tables the stream may leave out: small streams of single clips, which decode "
+                      "takes the library for too (motion-space)");
   command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
   command->add_flag("--json", options->json, "Print what was written as one JSON object");
   command->callback([options, &session] { run_encode(*options, session); });

@@ -255,6 +255,38 @@ bool equal(const Skeleton& a, const Skeleton& b) {
   return true;
 }
 
+void put_skeletons(IntegerWriter& out, std::span<const Skeleton> skeletons, std::span<const Skeleton> known) {
+  out.put(static_cast<std::int64_t>(skeletons.size()), count);
+  for (std::size_t s = 0; s < skeletons.size(); ++s) {
+    if (!known.empty()) {
+      const auto at = std::ranges::find_if(known, [&](const Skeleton& one) { return equal(one, skeletons[s]); });
+      out.put(at == known.end() ? 0 : at - known.begin() + 1, skeleton_number);
+      if (at != known.end()) continue;
+    }
+    put_skeleton(out, skeletons[s], s > 0 ? &skeletons[s - 1] : nullptr);
+  }
+}
+
+// What the adaptive code says is bounded by its size: `left_to_say` counts joints and names together.
+std::vector<Skeleton> get_skeletons(IntegerReader& in, std::int64_t most, std::int64_t& left_to_say,
+                                    std::span<const Skeleton> known) {
+  std::vector<Skeleton> out;
+  const std::int64_t skeletons = in.get_between(1, most, count);
+  for (std::int64_t s = 0; s < skeletons; ++s) {
+    const std::int64_t number =
+        known.empty() ? 0 : in.get_between(0, static_cast<std::int64_t>(known.size()), skeleton_number);
+    if (number > 0) {
+      out.push_back(known[static_cast<std::size_t>(number) - 1]);
+    } else {
+      out.push_back(get_skeleton(in, s > 0 ? &out.back() : nullptr));
+    }
+    if (!out.front().same_tree(out.back())) in.damaged();
+    left_to_say -= 16 * out.back().joint_count();
+    if (left_to_say < 0) in.damaged();
+  }
+  return out;
+}
+
 }  // namespace
 
 std::int64_t ClipTable::frames() const {
@@ -283,30 +315,35 @@ int ClipTable::add_skeleton(const Skeleton& skeleton, const std::string& clip) {
   return static_cast<int>(skeletons.size()) - 1;
 }
 
-Bytes pack_clip_table(const ClipTable& table) {
+Bytes pack_skeletons(std::span<const Skeleton> skeletons) {
   IntegerWriter out;
-  out.put(static_cast<std::int64_t>(table.skeletons.size()), count);
-  for (std::size_t s = 0; s < table.skeletons.size(); ++s) {
-    put_skeleton(out, table.skeletons[s], s > 0 ? &table.skeletons[s - 1] : nullptr);
-  }
+  put_skeletons(out, skeletons, {});
+  return std::move(out).finish();
+}
+
+std::vector<Skeleton> unpack_skeletons(std::span<const std::byte> bytes, const std::string& source) {
+  IntegerReader in(bytes, source);
+  std::int64_t left_to_say = 65536 + 16 * static_cast<std::int64_t>(bytes.size());
+  std::vector<Skeleton> out = get_skeletons(in, static_cast<std::int64_t>(bytes.size()), left_to_say, {});
+  in.expect_end();
+  return out;
+}
+
+Bytes pack_clip_table(const ClipTable& table, std::span<const Skeleton> known) {
+  IntegerWriter out;
+  put_skeletons(out, table.skeletons, known);
   out.put(static_cast<std::int64_t>(table.clips.size()), count);
   const ClipEntry none;
   for (std::size_t c = 0; c < table.clips.size(); ++c) put_clip(out, table.clips[c], c > 0 ? table.clips[c - 1] : none);
   return std::move(out).finish();
 }
 
-ClipTable unpack_clip_table(std::span<const std::byte> bytes, std::int64_t most_frames, const std::string& source) {
+ClipTable unpack_clip_table(std::span<const std::byte> bytes, std::int64_t most_frames, const std::string& source,
+                            std::span<const Skeleton> known) {
   IntegerReader in(bytes, source);
   ClipTable out;
-  // The adaptive code can say much in little, so what it says is bounded by its size: joints and names together.
   std::int64_t left_to_say = 65536 + 16 * static_cast<std::int64_t>(bytes.size());
-  const std::int64_t skeletons = in.get_between(1, static_cast<std::int64_t>(bytes.size()), count);
-  for (std::int64_t s = 0; s < skeletons; ++s) {
-    out.skeletons.push_back(get_skeleton(in, s > 0 ? &out.skeletons.back() : nullptr));
-    if (!out.skeletons.front().same_tree(out.skeletons.back())) in.damaged();
-    left_to_say -= 16 * out.skeletons.back().joint_count();
-    if (left_to_say < 0) in.damaged();
-  }
+  out.skeletons = get_skeletons(in, static_cast<std::int64_t>(bytes.size()), left_to_say, known);
   const std::int64_t clips = in.get_between(1, most_frames, count);
   const ClipEntry none;
   std::int64_t left = most_frames;

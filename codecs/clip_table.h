@@ -38,9 +38,15 @@ struct ClipTable {
   int add_skeleton(const Skeleton& skeleton, const std::string& clip);
 };
 
-[[nodiscard]] Bytes pack_clip_table(const ClipTable& table);
-// Throws Error{bad_input} naming `source`. At most `most_frames` frames in all are believed.
+// `known`: skeletons that the reader has and that need no telling.
+[[nodiscard]] Bytes pack_clip_table(const ClipTable& table, std::span<const Skeleton> known = {});
+// Throws Error{bad_input} naming `source`. At most `most_frames` frames in all are believed. `known` must be what the
+// table was packed with.
 [[nodiscard]] ClipTable unpack_clip_table(std::span<const std::byte> bytes, std::int64_t most_frames,
-                                          const std::string& source);
+                                          const std::string& source, std::span<const Skeleton> known = {});
+
+// At least one, all of one tree.
+[[nodiscard]] Bytes pack_skeletons(std::span<const Skeleton> skeletons);
+[[nodiscard]] std::vector<Skeleton> unpack_skeletons(std::span<const std::byte> bytes, const std::string& source);
 
 }  // namespace kinespace

@@ -46,8 +46,12 @@ struct CodecSetting {
   std::string_view meaning;  // with its unit
 };
 
+class MotionSpaceBasis;
+
 struct CodecOptions {
   CodecTarget target;
+  // Tables that the reader has too (codecs/motion_space_basis.h), for codecs that take them; nullptr: none.
+  const MotionSpaceBasis* basis = nullptr;
   std::map<std::string, double, std::less<>> settings;  // by CodecSetting::name; the rest are as they are
   Progress progress;
 };
@@ -108,6 +112,8 @@ class Codec {
 
   [[nodiscard]] virtual std::string_view name() const = 0;
   [[nodiscard]] virtual std::span<const CodecSetting> settings() const = 0;
+  // Whether CodecOptions::basis may be given.
+  [[nodiscard]] virtual bool takes_basis() const { return false; }
   // Options have been checked. Throws Error{usage} when the target cannot be met, Error{bad_input} for clips that
   // cannot be encoded (no frames, values that are no numbers).
   [[nodiscard]] virtual Bytes encode(std::span<const Clip> clips, const CodecOptions& options) const = 0;

@@ -69,15 +69,15 @@ Eigen::VectorXd MotionSpaceEncoder::gains(double step, const WindowLayout& layou
   return out;
 }
 
-// Returns the projection of pose vectors onto the basis that is sent.
-Eigen::MatrixXd MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows,
-                                                 MotionSpaceTables& tables) const {
+// The components that pay, as they are sent.
+void MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows, bool all,
+                                      MotionSpaceTables& tables) const {
   const double step = tables.step;
   const int d = reference_.dimensions();
   const Eigen::VectorXd gain = gains(step, layout, windows);
   std::vector<int> kept;
   for (int c = 0; c < d; ++c) {
-    if (gain(c) > 0) kept.push_back(c);
+    if (all || gain(c) > 0) kept.push_back(c);
   }
   Eigen::MatrixXd basis(d, static_cast<Eigen::Index>(kept.size()));
   std::vector<int> exponents;
@@ -91,8 +91,6 @@ Eigen::MatrixXd MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std
   const Eigen::MatrixXd lower =
       fixed_cholesky(pose_metric(table_.skeletons.front(), reference_, rest).lifted(tables.shell_weight));
   tables.basis = quantise_basis(lower.transpose() * basis, exponents);
-  const Eigen::MatrixXd sent = solve_transposed(lower, tables.basis.mixing());
-  return projection_onto(sent, metric_);
 }
 
 namespace {
@@ -209,7 +207,17 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
   for (std::size_t g = 0; g < a.layout.groups.size(); g += static_cast<std::size_t>(settings.sample)) {
     for (std::size_t i = 0; i < a.layout.groups[g].count; ++i) windows.push_back(a.layout.groups[g].first + i);
   }
-  const RowMatrix projection = choose_basis(a.layout, windows, a.tables) / step;
+  if (basis_ != nullptr) {
+    a.rung = basis_->rung_for(step);
+    const MotionSpaceTables& rung = basis_->rungs()[static_cast<std::size_t>(a.rung)];
+    a.tables.shell_weight = rung.shell_weight;
+    a.tables.basis = rung.basis;
+    a.tables.coding = rung.coding;
+  } else {
+    choose_basis(a.layout, windows, settings.all_components, a.tables);
+  }
+  const RowMatrix projection =
+      projection_onto(WindowSynthesis(a.tables, table_.skeletons.front()).basis(), metric_) / step;
   const int components = a.tables.basis.components;
 
   // Scaled coefficients, and what the spectrum of their plain rounding is.
@@ -232,7 +240,7 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
   CodingStatistics first;
   for (const CodingStatistics& one : plain) first.add(one);
   a.tables.coding.spectrum = spectrum_of(first, components);
-  if (learned != nullptr) {
+  if (learned != nullptr && basis_ == nullptr) {
     a.tables.coding.start = learned->tables.coding.start;
     a.tables.coding.points = learned->tables.coding.points;
   }
@@ -242,13 +250,12 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
   if (!estimate) {
     // Once more with what was learned.
     a.tables.coding.spectrum = spectrum_of(total, components);
-    a.tables.coding.start = total.counts.learn();
-    a.tables.coding.points = total.reconstruction();
-    code_groups(coding, settings, true);
-  } else {
+  }
+  if (basis_ == nullptr) {
     a.tables.coding.start = total.counts.learn();
     a.tables.coding.points = total.reconstruction();
   }
+  if (!estimate) code_groups(coding, settings, true);
   return std::move(coding.attempt);
 }
 
@@ -261,11 +268,13 @@ ClipErrorSums MotionSpaceEncoder::error_of(std::span<const Clip> decoded) const 
   return out;
 }
 
-Bytes write_stream(const Attempt& attempt, const MeasuredError& error) {
+Bytes write_stream(const Attempt& attempt, const MeasuredError& error, const MotionSpaceBasis* basis) {
   BitstreamWriter out(stream_kind("motion-space"));
   out.set_error(error);
-  const Bytes clips = pack_clip_table(attempt.clips);
-  const Bytes tables = pack_motion_space_tables(attempt.tables);
+  if (basis != nullptr) out.set_option("basis", basis->id());
+  const Bytes clips = pack_clip_table(attempt.clips, basis != nullptr ? basis->skeletons() : std::vector<Skeleton>());
+  const Bytes tables =
+      basis != nullptr ? pack_own_tables(attempt.tables, attempt.rung) : pack_motion_space_tables(attempt.tables);
   std::vector<Bytes> layers;
   std::size_t size = clips.size() + tables.size();
   for (std::size_t layer = 0; layer < layer_count; ++layer) {

@@ -22,6 +22,7 @@
 #pragma once
 
 #include "codecs/codec.h"
+#include "codecs/motion_space_basis.h"
 
 namespace kinespace {
 
@@ -29,8 +30,14 @@ class MotionSpaceCodec final : public Codec {
  public:
   [[nodiscard]] std::string_view name() const override { return "motion-space"; }
   [[nodiscard]] std::span<const CodecSetting> settings() const override;
+  [[nodiscard]] bool takes_basis() const override { return true; }
   [[nodiscard]] Bytes encode(std::span<const Clip> clips, const CodecOptions& options) const override;
   [[nodiscard]] std::unique_ptr<StreamReader> open(Bitstream stream) const override;
+
+  // With tables that a library has instead of tables of the stream's own (CodecOptions::basis). The shell error is then
+  // what the basis gives: near shell_ratio times the mean, but not held to it. `basis` must outlive the call only.
+  // Throws Error{usage} when the stream was made with another basis, or the basis is missing.
+  [[nodiscard]] std::unique_ptr<StreamReader> open(Bitstream stream, const MotionSpaceBasis* basis) const;
 };
 
 }  // namespace kinespace

@@ -7,6 +7,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "base/error.h"
 #include "codecs/time_blocks.h"
 
 namespace kinespace {
@@ -50,10 +51,18 @@ std::vector<int> equal_windows(int frames, int wanted) {
   return out;
 }
 
+void require_same_tree(const MotionSpaceBasis& basis, const Clip& clip) {
+  if (basis.skeletons().front().same_tree(clip.skeleton)) return;
+  throw Error(ErrorKind::usage, {.file = clip.name,
+                                 .found = "a skeleton of another tree than the basis",
+                                 .expected = "clips of the skeleton that the basis was learned from"});
+}
+
 }  // namespace
 
-MotionSpaceEncoder::MotionSpaceEncoder(std::span<const Clip> clips, const Progress& progress)
-    : clips_(clips), progress_(progress), vectors_(clips.size()) {
+MotionSpaceEncoder::MotionSpaceEncoder(std::span<const Clip> clips, const Progress& progress,
+                                       const MotionSpaceBasis* basis)
+    : clips_(clips), progress_(progress), basis_(basis), vectors_(clips.size()) {
   std::vector<ClipCurves> curves(clips.size());
   for (const Clip& clip : clips) {
     const int skeleton = table_.add_skeleton(clip.skeleton, clip.name);
@@ -61,9 +70,14 @@ MotionSpaceEncoder::MotionSpaceEncoder(std::span<const Clip> clips, const Progre
     frames_ += clip.frames;
   }
   tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) { curves[c] = clip_curves(clips[c]); });
-  ReferencePoseBuilder builder(table_.skeletons.front());
-  for (const ClipCurves& one : curves) builder.add(one);
-  reference_ = builder.build();
+  if (basis_ != nullptr) {
+    require_same_tree(*basis_, clips.front());
+    reference_ = basis_->reference();
+  } else {
+    ReferencePoseBuilder builder(table_.skeletons.front());
+    for (const ClipCurves& one : curves) builder.add(one);
+    reference_ = builder.build();
+  }
   progress_.check_stop();
   tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
     vectors_[c] = pose_vectors(curves[c], reference_);

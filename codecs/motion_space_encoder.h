@@ -7,6 +7,7 @@
 
 #include "base/progress.h"
 #include "codecs/clip_error.h"
+#include "codecs/motion_space_basis.h"
 #include "codecs/motion_space_tables.h"
 
 namespace kinespace {
@@ -16,12 +17,14 @@ struct MotionSpaceSettings {
   double rate_weight = 0.18;  // lambda: squared steps that a bit is worth. dD/dR of white noise is 0.1155 at high rates
   double window_s = 0;        // fixed windows of so many seconds; 0: as time_blocks.h plans
   int group_frames = 4096;
-  int sample = 1;  // every so many groups only, for estimates
+  int sample = 1;               // every so many groups only, for estimates
+  bool all_components = false;  // those that do not pay too
 };
 
 // The result of coding at one step.
 struct Attempt {
   MotionSpaceTables tables;
+  int rung = 0;  // of the shared basis, where there is one
   ClipTable clips;
   WindowLayout layout;
   std::vector<std::vector<Bytes>> groups;  // [group][layer]; empty for groups that were not sampled
@@ -31,8 +34,8 @@ struct Attempt {
 
 class MotionSpaceEncoder {
  public:
-  // Throws Error as Codec::encode does.
-  MotionSpaceEncoder(std::span<const Clip> clips, const Progress& progress);
+  // `basis`: what the stream shares; nullptr: tables of its own. Throws Error as Codec::encode does.
+  MotionSpaceEncoder(std::span<const Clip> clips, const Progress& progress, const MotionSpaceBasis* basis);
 
   // Cuts the clips into windows and transforms them, for about this step.
   void plan(double step, const MotionSpaceSettings& settings);
@@ -43,6 +46,7 @@ class MotionSpaceEncoder {
                                 std::span<const int> finer = {}) const;
   [[nodiscard]] std::size_t window_count() const { return first_window_.back(); }
   [[nodiscard]] std::int64_t frames() const { return frames_; }
+  [[nodiscard]] const std::vector<Skeleton>& skeletons() const { return table_.skeletons; }
   // Of decoded clips, in the order of those that are encoded.
   [[nodiscard]] ClipErrorSums error_of(std::span<const Clip> decoded) const;
 
@@ -57,12 +61,13 @@ class MotionSpaceEncoder {
   [[nodiscard]] int active_functions(std::size_t window, double step) const;
   [[nodiscard]] Eigen::VectorXd gains(double step, const WindowLayout& layout,
                                       std::span<const std::size_t> windows) const;
-  [[nodiscard]] Eigen::MatrixXd choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows,
-                                             MotionSpaceTables& tables) const;
+  void choose_basis(const WindowLayout& layout, std::span<const std::size_t> windows, bool all,
+                    MotionSpaceTables& tables) const;
   void code_groups(Coding& coding, const MotionSpaceSettings& settings, bool measure) const;
 
   std::span<const Clip> clips_;
   const Progress& progress_;
+  const MotionSpaceBasis* basis_;
   ClipTable table_;
   ReferencePose reference_;
   std::vector<PoseVectors> vectors_;
@@ -77,6 +82,6 @@ class MotionSpaceEncoder {
 };
 
 // The finished stream.
-[[nodiscard]] Bytes write_stream(const Attempt& attempt, const MeasuredError& error);
+[[nodiscard]] Bytes write_stream(const Attempt& attempt, const MeasuredError& error, const MotionSpaceBasis* basis);
 
 }  // namespace kinespace

@@ -28,12 +28,10 @@ std::vector<std::span<const std::byte>> split_layer(std::span<const std::byte> l
 
 class MotionSpaceReader final : public StreamReader {
  public:
-  explicit MotionSpaceReader(Bitstream stream)
+  MotionSpaceReader(Bitstream stream, const MotionSpaceBasis* basis)
       : stream_(std::move(stream)),
-        table_(unpack_clip_table(stream_.section("clips"), most_frames(), stream_.source())),
-        tables_(unpack_motion_space_tables(stream_.section("tables"),
-                                           static_cast<int>(table_.skeletons.front().rotating_joints().size()),
-                                           stream_.source())),
+        table_(unpack_clip_table(stream_.section("clips"), most_frames(), stream_.source(), known_skeletons(basis))),
+        tables_(read_tables(basis)),
         layout_(lay_out(table_, tables_.coding.spectrum, tables_.group_frames)),
         synthesis_(tables_, table_.skeletons.front()) {
     const auto blocks = stream_.blocks("layers");
@@ -103,6 +101,25 @@ class MotionSpaceReader final : public StreamReader {
     std::vector<double> values;
     std::vector<std::size_t> offsets;
   };
+
+  [[nodiscard]] static std::span<const Skeleton> known_skeletons(const MotionSpaceBasis* basis) {
+    if (basis == nullptr) return {};
+    return basis->skeletons();
+  }
+
+  [[nodiscard]] MotionSpaceTables read_tables(const MotionSpaceBasis* basis) const {
+    const auto bytes = stream_.section("tables");
+    const Skeleton& skeleton = table_.skeletons.front();
+    if (basis == nullptr) {
+      return unpack_motion_space_tables(bytes, static_cast<int>(skeleton.rotating_joints().size()), stream_.source());
+    }
+    if (!skeleton.same_tree(basis->skeletons().front())) {
+      throw Error(ErrorKind::bad_input, {.file = stream_.source(),
+                                         .found = "a skeleton of another tree than its basis",
+                                         .expected = "the skeleton of the basis (damaged)"});
+    }
+    return unpack_own_tables(bytes, basis->rungs(), stream_.source());
+  }
 
   // No more frames are believed than would fit this (an encoder pads what is smaller).
   [[nodiscard]] std::int64_t most_frames() const { return 65536 + 256 * static_cast<std::int64_t>(stream_.size()); }
@@ -175,9 +192,22 @@ class MotionSpaceReader final : public StreamReader {
 
 }  // namespace
 
-std::unique_ptr<StreamReader> MotionSpaceCodec::open(Bitstream stream) const {
+std::unique_ptr<StreamReader> MotionSpaceCodec::open(Bitstream stream, const MotionSpaceBasis* basis) const {
   stream.require_kind(stream_kind(name()));
-  return std::make_unique<MotionSpaceReader>(std::move(stream));
+  const std::string* wanted = stream.find_option("basis");
+  if (wanted == nullptr) return std::make_unique<MotionSpaceReader>(std::move(stream), nullptr);
+  if (basis == nullptr || basis->id() != *wanted) {
+    throw Error(ErrorKind::usage, {.file = stream.source(),
+                                   .found = basis == nullptr ? "a stream that needs the basis of a library"
+                                                             : "a stream that needs another basis",
+                                   .expected = "basis " + *wanted,
+                                   .remedy = "name the library that it was encoded with by --basis"});
+  }
+  return std::make_unique<MotionSpaceReader>(std::move(stream), basis);
+}
+
+std::unique_ptr<StreamReader> MotionSpaceCodec::open(Bitstream stream) const {
+  return open(std::move(stream), nullptr);
 }
 
 }  // namespace kinespace

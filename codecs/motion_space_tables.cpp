@@ -45,6 +45,16 @@ double get_number(ByteReader& in, double least, double most, const char* what) {
   return value;
 }
 
+double get_step(ByteReader& in) {
+  return get_number(in, 1e-12, 1e12, "a quantiser step out of range");
+}
+
+int get_group_frames(ByteReader& in) {
+  const std::uint64_t frames = get_varint(in);
+  if (frames < 1 || frames > (1U << 24)) in.fail("groups of no or too many frames", "1 to 2^24");
+  return static_cast<int>(frames);
+}
+
 KINESPACE_VECTOR_CLONES void add_scaled(const double* from, double factor, double* to, std::size_t n) {
   for (std::size_t k = 0; k < n; ++k) to[k] += factor * from[k];
 }
@@ -76,11 +86,9 @@ MotionSpaceTables unpack_motion_space_tables(std::span<const std::byte> bytes, i
                                              const std::string& source) {
   ByteReader in(bytes, source);
   MotionSpaceTables out;
-  out.step = get_number(in, 1e-12, 1e12, "a quantiser step out of range");
+  out.step = get_step(in);
   out.shell_weight = get_number(in, 0, 1e6, "a shell weight out of range");
-  const std::uint64_t group_frames = get_varint(in);
-  if (group_frames < 1 || group_frames > (1U << 24)) in.fail("groups of no or too many frames", "1 to 2^24");
-  out.group_frames = static_cast<int>(group_frames);
+  out.group_frames = get_group_frames(in);
   for (int j = 0; j < rotating_joints; ++j) {
     std::array<std::int8_t, 3> steps{};
     for (std::int8_t& s : steps) s = in.get<std::int8_t>();
@@ -96,6 +104,28 @@ MotionSpaceTables unpack_motion_space_tables(std::span<const std::byte> bytes, i
   out.coding.spectrum = unpack_spectrum(get_part(in), count, source);
   out.coding.start = unpack_start(get_part(in), source);
   out.coding.points = unpack_points(get_part(in), source);
+  in.expect_end();
+  return out;
+}
+
+Bytes pack_own_tables(const MotionSpaceTables& tables, int rung) {
+  ByteWriter out;
+  put_varint(out, static_cast<std::uint64_t>(rung));
+  out.put(tables.step);
+  put_varint(out, static_cast<std::uint64_t>(tables.group_frames));
+  put_part(out, pack_spectrum(tables.coding.spectrum));
+  return std::move(out).take();
+}
+
+MotionSpaceTables unpack_own_tables(std::span<const std::byte> bytes, std::span<const MotionSpaceTables> rungs,
+                                    const std::string& source) {
+  ByteReader in(bytes, source);
+  const std::uint64_t rung = get_varint(in);
+  if (rung >= rungs.size()) in.fail("a rung that the basis does not have", "the basis it was made with (damaged)");
+  MotionSpaceTables out = rungs[rung];
+  out.step = get_step(in);
+  out.group_frames = get_group_frames(in);
+  out.coding.spectrum = unpack_spectrum(get_part(in), out.basis.components, source);
   in.expect_end();
   return out;
 }

@@ -31,6 +31,11 @@ struct MotionSpaceTables {
 [[nodiscard]] MotionSpaceTables unpack_motion_space_tables(std::span<const std::byte> bytes, int rotating_joints,
                                                            const std::string& source);
 
+// What a stream with a shared basis says for itself: step, groups, spectrum, and the rung that the rest is taken from.
+[[nodiscard]] Bytes pack_own_tables(const MotionSpaceTables& tables, int rung);
+[[nodiscard]] MotionSpaceTables unpack_own_tables(std::span<const std::byte> bytes,
+                                                  std::span<const MotionSpaceTables> rungs, const std::string& source);
+
 // One window of one clip in the stream.
 struct WindowPlace {
   int clip = 0;

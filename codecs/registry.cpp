@@ -11,6 +11,7 @@
 #include "codecs/baselines/raw_codec.h"
 #include "codecs/motion_space_codec.h"
 #include "codecs/qbc_codec.h"
+#include "codecs/rma/rma_codec.h"
 
 namespace kinespace {
 namespace {
@@ -101,7 +102,8 @@ std::span<const Codec* const> all_codecs() {
   static const ChannelCodec fourier(fourier_transform()), legendre(legendre_transform());
   static const QbcCodec qbc;
   static const RawCodec raw_zstd(Packer::zstd), raw_xz(Packer::xz);
-  static const std::array<const Codec*, 9> codecs{&motion_space, &qbc,      &pca,      &dwt,      &awt,
+  static const RmaCodec rma;
+  static const std::array<const Codec*, 10> codecs{&motion_space, &rma,      &qbc,     &pca,      &dwt,   &awt,
                                                   &fourier,      &legendre, &raw_zstd, &raw_xz};
   return codecs;
 }
@@ -124,6 +126,9 @@ Bytes encode(std::string_view codec, std::span<const Clip> clips, const CodecOpt
   options.target.validate();
   check_settings(found, options);
   check_clips(clips);
+  if (options.basis != nullptr && !found.takes_basis()) {
+    throw Error(ErrorKind::usage, {.found = fmt::format("a basis for codec {}", codec), .expected = "none"});
+  }
   return found.encode(clips, options);
 }
 
@@ -132,9 +137,19 @@ bool is_clip_stream(std::span<const std::byte> bytes) {
   return Bitstream::parse_prefix(bytes, "").kind().starts_with(kind_prefix);
 }
 
-std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std::string source) {
+std::string basis_of(std::span<const std::byte> bytes, std::string source) {
+  const Bitstream stream = Bitstream::parse_prefix(bytes, std::move(source));
+  const std::string* basis = stream.find_option("basis");
+  return basis != nullptr ? *basis : std::string();
+}
+
+std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std::string source,
+                                          const MotionSpaceBasis* basis) {
   Bitstream stream = Bitstream::parse_prefix(bytes, std::move(source));
   const std::string kind = stream.kind();
+  if (basis != nullptr && kind == stream_kind(MotionSpaceCodec().name())) {
+    return MotionSpaceCodec().open(std::move(stream), basis);
+  }
   for (const Codec* codec : all_codecs()) {
     if (kind == stream_kind(codec->name())) return codec->open(std::move(stream));
   }

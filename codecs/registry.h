@@ -22,7 +22,12 @@ namespace kinespace {
 // Whether the bytes are a stream of clips, whole or the beginning of one.
 [[nodiscard]] bool is_clip_stream(std::span<const std::byte> bytes);
 // Opens a stream by the codec that made it; one that was cut short inside its levels of detail opens too. The bytes
-// must outlive the reader. Throws Error{bad_input}.
-[[nodiscard]] std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std::string source);
+// must outlive the reader. `basis`: where the stream was made with one (basis_of). Throws Error{bad_input}, and
+// Error{usage} when the basis it needs is not given.
+[[nodiscard]] std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std::string source,
+                                                        const MotionSpaceBasis* basis = nullptr);
+
+// The id of the basis that a stream needs; empty when it needs none. Throws Error{bad_input}.
+[[nodiscard]] std::string basis_of(std::span<const std::byte> bytes, std::string source);
 
 }  // namespace kinespace
