@@ -10,8 +10,8 @@
 namespace kinespace {
 namespace {
 
-constexpr int block = 64;  // vertices; the last block is filled up with zeros
-constexpr int lanes = 8;   // sums side by side: vectors run along them, and their order is the same everywhere
+constexpr int block = 128;  // vertices; the last block is filled up with zeros
+constexpr int lanes = 8;    // sums side by side: vectors run along them, and their order is the same everywhere
 
 struct Shape {
   int vertices, functions;
@@ -73,9 +73,10 @@ void add_correlations(Shape shape, const float* blocks, const double* x, double*
         }
       }
       for (int d = 0; d < 3; ++d) {
-        double all = 0;
-        for (const double one : sum[d]) all += one;
-        c[3 * k + d] += all;
+        for (int half = lanes / 2; half > 0; half /= 2) {
+          for (int l = 0; l < half; ++l) sum[d][l] += sum[d][l + half];
+        }
+        c[3 * k + d] += sum[d][0];
       }
     }
   }
