@@ -5,18 +5,24 @@
 
 namespace kinespace {
 
-SeamSmoother::SeamSmoother(int dimensions, int frames, std::span<const int> seams, double reach, Raw raw)
+SeamSmoother::SeamSmoother(int dimensions, int frames, std::span<const int> seams, double reach, Raw raw,
+                           std::span<const int> breaks)
     : raw_(std::move(raw)), loaded_(seams.size()) {
   for (std::vector<double>* one : {&gap_, &slope_, &left_, &right_, &beyond_}) {
     one->resize(static_cast<std::size_t>(dimensions));
   }
   for (std::size_t s = 0; s < seams.size(); ++s) {
-    const bool last = s + 1 == seams.size();
-    const int before = seams[s] - (s > 0 ? seams[s - 1] : 0);
-    const int after = (last ? frames : seams[s + 1]) - seams[s];
-    seams_.push_back({.frame = seams[s],
-                      .left = std::min(reach, (s > 0 ? 0.5 : 1.0) * before),
-                      .right = std::min(reach, (last ? 1.0 : 0.5) * after),
+    const int seam = seams[s];
+    const auto next_break = std::ranges::upper_bound(breaks, seam);
+    const int broken_before = next_break == breaks.begin() ? 0 : *(next_break - 1);
+    const int broken_after = next_break == breaks.end() ? frames : *next_break;
+    const bool shared_before = s > 0 && seams[s - 1] > broken_before;
+    const bool shared_after = s + 1 < seams.size() && seams[s + 1] < broken_after;
+    const int before = seam - (shared_before ? seams[s - 1] : broken_before);
+    const int after = (shared_after ? seams[s + 1] : broken_after) - seam;
+    seams_.push_back({.frame = seam,
+                      .left = std::min(reach, (shared_before ? 0.5 : 1.0) * before),
+                      .right = std::min(reach, (shared_after ? 0.5 : 1.0) * after),
                       .one_left = before < 2,
                       .one_right = after < 2});
   }
@@ -46,6 +52,13 @@ void SeamSmoother::load(const Seam& seam) {
     }
   }
   for (std::size_t k = 0; k < gap_.size(); ++k) gap_[k] = right_[k] - left_[k] - 0.5 * gap_[k];
+}
+
+bool SeamSmoother::touches(int frame) const {
+  for (std::size_t s = next_; s < seams_.size() && seams_[s].frame - 0.5 - seams_[s].left < frame; ++s) {
+    if (frame < seams_[s].frame - 0.5 + seams_[s].right) return true;
+  }
+  return false;
 }
 
 void SeamSmoother::apply(int frame, std::span<double> values) {

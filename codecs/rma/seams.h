@@ -23,9 +23,13 @@ class SeamSmoother {
   using Raw = std::function<void(int frame, std::span<double> out)>;
 
   // Frames are vectors of `dimensions` numbers. `seams`: the first frames of later clips, ascending, within (0,
-  // frames); `reach`: in frames; between two seams it is at most half of the way.
-  SeamSmoother(int dimensions, int frames, std::span<const int> seams, double reach, Raw raw);
+  // frames); `reach`: in frames; between two seams it is at most half of the way. `breaks`: ascending; first frames
+  // that are not to go on from those before them, which nothing reaches across.
+  SeamSmoother(int dimensions, int frames, std::span<const int> seams, double reach, Raw raw,
+               std::span<const int> breaks = {});
 
+  // Whether apply would change it.
+  [[nodiscard]] bool touches(int frame) const;
   // Adds the correction of a frame to `values`. Frames must come in rising order.
   void apply(int frame, std::span<double> values);
 

@@ -1,0 +1,210 @@
+#include "codecs/rma/repeat_stream.h"
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "codecs/rma/contact_ik.h"
+#include "codecs/rma/seams.h"
+#include "storage/varint.h"
+
+namespace kinespace {
+namespace {
+
+constexpr double smoothing_s = 0.12;  // to either side of a seam
+constexpr int prediction_context = contact_contexts;
+constexpr int jump_context = prediction_context + prediction_contexts;
+constexpr int point_context = jump_context + 1;
+constexpr int context_count = point_context + 1;
+
+}  // namespace
+
+Bytes pack_repeats(const RepeatTables& tables, const ClipTable& clips) {
+  ValueWriter out(context_count);
+  put_predictions(out, clips, tables.predictions, prediction_context);
+  for (const bool jump : tables.jumps) out.put_bit(jump, jump_context);
+  for (const auto& clip : tables.contacts) put_contacts(out, clip);
+  for (const auto& level : tables.predicted.points.shift) {
+    for (const std::int8_t shift : level) out.put(shift, point_context);
+  }
+  const Bytes numbers = std::move(out).finish();
+  const bool any = std::ranges::any_of(tables.predictions, &WindowPrediction::used);
+  ByteWriter all;
+  put_varint(all, numbers.size());
+  all.put_bytes(numbers);
+  if (!any) return std::move(all).take();
+  const Bytes spectrum = pack_spectrum(tables.predicted.spectrum);
+  put_varint(all, spectrum.size());
+  all.put_bytes(spectrum);
+  all.put_bytes(pack_start(tables.predicted.start));
+  return std::move(all).take();
+}
+
+void unpack_repeats(std::span<const std::byte> bytes, const ClipTable& clips, std::int64_t numbers,
+                    const std::string& source, RepeatTables& out) {
+  ByteReader all(bytes, source);
+  ValueReader in(all.take(get_count(all, 1, "bytes of repeats")), context_count, source);
+  out.predictions = get_predictions(in, clips, prediction_context);
+  for (std::size_t w = 0; w < out.predictions.size(); ++w) out.jumps.push_back(in.get_bit(jump_context));
+  for (const ClipEntry& clip : clips.clips) {
+    const Skeleton& skeleton = clips.skeletons[static_cast<std::size_t>(clip.skeleton)];
+    out.contacts.push_back(get_contacts(in, clip.frames, skeleton.joint_count(), numbers));
+  }
+  for (auto& level : out.predicted.points.shift) {
+    for (std::int8_t& shift : level) shift = static_cast<std::int8_t>(in.get_between(-127, 127, point_context));
+  }
+  in.expect_end();
+  const int components = out.tables.basis.components;
+  out.predicted.spectrum = out.tables.coding.spectrum;
+  if (std::ranges::any_of(out.predictions, &WindowPrediction::used)) {
+    const auto spectrum = all.take(get_count(all, 1, "bytes of a spectrum"));
+    out.predicted.spectrum = unpack_spectrum(spectrum, components, source);
+    out.predicted.start = unpack_start(all.take(all.remaining()), source);
+  }
+  all.expect_end();
+}
+
+std::int64_t numbers_in(const RepeatTables& tables) {
+  std::int64_t out = 0;
+  for (const auto& clip : tables.contacts) {
+    for (const ContactCode& code : clip) out += 16 + code.frames();
+  }
+  return out;
+}
+
+RepeatLayout::RepeatLayout(const ClipTable& clips, const RepeatTables& tables)
+    : plain(lay_out(clips, tables.tables.coding.spectrum, tables.tables.group_frames)),
+      predicted(lay_out(clips, tables.predicted.spectrum, tables.tables.group_frames)),
+      group_of_(plain.windows.size()) {
+  for (std::size_t g = 0; g < plain.groups.size(); ++g) {
+    for (std::size_t i = 0; i < plain.groups[g].count; ++i) group_of_[plain.groups[g].first + i] = g;
+  }
+}
+
+GroupPart group_part(const RepeatLayout& layout, const RepeatTables& tables, std::size_t group, bool is_predicted) {
+  GroupPart out;
+  const WindowGroup& of = layout.plain.groups[group];
+  const auto components = static_cast<std::size_t>(tables.tables.basis.components);
+  for (std::size_t w = of.first; w < of.first + of.count; ++w) {
+    if (tables.predictions[w].used() != is_predicted) continue;
+    const WindowPlace& window = layout.window(w, is_predicted);
+    const bool neighbours = !out.windows.empty() && out.windows.back() + 1 == w;
+    out.windows.push_back(w);
+    out.blocks.push_back(
+        {.functions = window.functions, .edges = window.edges, .follows = window.follows && neighbours});
+    out.offsets.push_back(out.size);
+    out.size += components * static_cast<std::size_t>(window.functions);
+  }
+  return out;
+}
+
+RepeatDecoder::RepeatDecoder(const ClipTable& clips, const RepeatTables& tables, const RepeatLayout& layout,
+                             Groups groups, std::string source)
+    : clips_(clips),
+      tables_(tables),
+      layout_(layout),
+      groups_(std::move(groups)),
+      source_(std::move(source)),
+      synthesis_(tables.tables, clips.skeletons.front()) {}
+
+std::vector<double> RepeatDecoder::plain_part(std::size_t w) const {
+  const bool is_predicted = tables_.predictions[w].used();
+  const WindowPlace& window = layout_.window(w, is_predicted);
+  const std::size_t g = layout_.group_of(w);
+  const auto group = groups_(g);
+  const auto [offset, size] = group->places[w - layout_.plain.groups[g].first];
+  std::vector<double> out(static_cast<std::size_t>(tables_.tables.reference.dimensions()) *
+                          static_cast<std::size_t>(window.points));
+  thread_local WindowSynthesis::Scratch scratch;
+  synthesis_.synthesise(window, std::span(group->values[is_predicted ? 1 : 0]).subspan(offset, size), out, scratch);
+  return out;
+}
+
+std::vector<double> RepeatDecoder::predicted_vectors(std::size_t w) const {
+  const WindowPrediction& prediction = tables_.predictions[w];
+  const auto clip = static_cast<std::size_t>(prediction.clip);
+  const int first = prediction.first_frame();
+  const int count = std::min(prediction.last_frame() + 2, clips_.clips[clip].frames) - first;
+  const auto dimensions = static_cast<std::size_t>(tables_.tables.reference.dimensions());
+  std::vector<double> reference(dimensions * static_cast<std::size_t>(count));
+  for (std::size_t r = layout_.plain.first_of_clip[clip]; r < layout_.plain.first_of_clip[clip + 1]; ++r) {
+    const WindowPlace& window = layout_.plain.windows[r];
+    const int from = std::max(first, window.first);
+    const int to = std::min(first + count, window.first + window.points);
+    if (from >= to) continue;
+    if (tables_.predictions[r].used()) {
+      throw Error(ErrorKind::bad_input, {.file = source_,
+                                         .found = "a prediction from a window that is predicted",
+                                         .expected = "one from windows that stand for themselves (damaged)"});
+    }
+    const std::vector<double> vectors = plain_part(r);
+    for (std::size_t k = 0; k < dimensions; ++k) {
+      std::copy_n(vectors.begin() + static_cast<std::ptrdiff_t>(k) * window.points + (from - window.first), to - from,
+                  reference.begin() + static_cast<std::ptrdiff_t>(k) * count + (from - first));
+    }
+  }
+  const WindowPlace& own = layout_.plain.windows[w];
+  std::vector<double> out(dimensions * static_cast<std::size_t>(own.points));
+  const double rate = clips_.clips[static_cast<std::size_t>(own.clip)].rate_hz;
+  predict_window(prediction, own.points, prediction_span(rate), reference, first, count, out);
+  return out;
+}
+
+std::vector<double> RepeatDecoder::window_vectors(std::size_t w) const {
+  std::vector<double> out = plain_part(w);
+  if (!tables_.predictions[w].used()) return out;
+  const std::vector<double> prediction = predicted_vectors(w);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] += prediction[i];
+  return out;
+}
+
+void RepeatDecoder::smooth_seams(std::size_t clip, std::vector<double>& vectors) const {
+  const ClipEntry& entry = clips_.clips[clip];
+  const auto frames = static_cast<std::size_t>(entry.frames);
+  const std::size_t dimensions = vectors.size() / frames;
+  std::vector<int> seams, jumps;
+  for (std::size_t w = layout_.plain.first_of_clip[clip] + 1; w < layout_.plain.first_of_clip[clip + 1]; ++w) {
+    (tables_.jumps[w] ? jumps : seams).push_back(layout_.plain.windows[w].first);
+  }
+  if (seams.empty()) return;
+  const auto get = [&](int frame, std::span<double> out) {
+    for (std::size_t k = 0; k < dimensions; ++k) out[k] = vectors[k * frames + static_cast<std::size_t>(frame)];
+  };
+  std::vector<double> frame(dimensions);
+  SeamSmoother smoother(static_cast<int>(dimensions), entry.frames, seams, smoothing_s * entry.rate_hz, get, jumps);
+  for (int f = 0; f < entry.frames; ++f) {
+    if (!smoother.touches(f)) continue;
+    get(f, frame);
+    smoother.apply(f, frame);
+    for (std::size_t k = 0; k < dimensions; ++k) vectors[k * frames + static_cast<std::size_t>(f)] = frame[k];
+  }
+}
+
+Clip RepeatDecoder::decode_without_contacts(std::size_t clip) const {
+  const ClipEntry& entry = clips_.clips[clip];
+  const auto frames = static_cast<std::size_t>(entry.frames);
+  const auto dimensions = static_cast<std::size_t>(tables_.tables.reference.dimensions());
+  std::vector<double> vectors(dimensions * frames);
+  for (std::size_t w = layout_.plain.first_of_clip[clip]; w < layout_.plain.first_of_clip[clip + 1]; ++w) {
+    const WindowPlace& window = layout_.plain.windows[w];
+    const std::vector<double> part = window_vectors(w);
+    for (std::size_t k = 0; k < dimensions; ++k) {
+      std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(k) * window.points, window.points,
+                  vectors.begin() + static_cast<std::ptrdiff_t>(k * frames) + window.first);
+    }
+  }
+  smooth_seams(clip, vectors);
+  const Skeleton& bones = clips_.skeletons[static_cast<std::size_t>(entry.skeleton)];
+  Clip out = make_clip(entry.name, bones, entry.rate_hz, entry.frames);
+  out.require_translation_track(bones.travel_root());
+  for (const SideTrack& track : entry.side_tracks) apply_side_track(track, 0, out);
+  PoseWriter(tables_.tables.reference, entry.placement, out).write(vectors, 0, entry.frames);
+  return out;
+}
+
+Clip RepeatDecoder::decode(std::size_t clip) const {
+  Clip out = decode_without_contacts(clip);
+  hold_contacts(out, contact_tracks(tables_.contacts[clip], out));
+  return out;
+}
+
+}  // namespace kinespace
