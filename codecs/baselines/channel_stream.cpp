@@ -66,7 +66,7 @@ std::vector<PiecePlace> lay_out_pieces(const ClipTable& clips) {
 }
 
 double ChannelTables::weight(int channel) const {
-  return weights.empty() ? 1 : grid_step(2 * weights[static_cast<std::size_t>(channel)]);
+  return weights.empty() ? 1 : grid_step(steps_per_octave / 4 * weights[static_cast<std::size_t>(channel)]);
 }
 
 Bytes pack_channel_tables(const ChannelTables& tables) {

@@ -6,20 +6,21 @@
 namespace kinespace {
 
 double grid_step(int index) {
-  constexpr std::array<double, 8> eighths{1,
-                                          1.0905077326652577,
-                                          1.1892071150027210,
-                                          1.2968395546510096,
-                                          1.4142135623730950,
-                                          1.5422108254079408,
-                                          1.6817928305074290,
-                                          1.8340080864093424};
-  const int octave = (index >= 0 ? index : index - 7) / 8;
-  return std::ldexp(eighths[static_cast<std::size_t>(index - 8 * octave)], octave);
+  const int octave = (index >= 0 ? index : index - steps_per_octave + 1) / steps_per_octave;
+  int rest = index - steps_per_octave * octave;
+  // Square roots are the same on every machine; powers are not.
+  double out = 1, root = 2;
+  for (int bit = steps_per_octave / 2; bit > 0; bit /= 2) {
+    root = std::sqrt(root);
+    if (rest < bit) continue;
+    out *= root;
+    rest -= bit;
+  }
+  return std::ldexp(out, octave);
 }
 
 int step_index_below(double step) {
-  const double index = std::floor(8 * std::log2(std::max(step, 1e-30)) + 1e-6);
+  const double index = std::floor(steps_per_octave * std::log2(std::max(step, 1e-30)) + 1e-6);
   return static_cast<int>(std::clamp<double>(index, -largest_step_index, largest_step_index));
 }
 

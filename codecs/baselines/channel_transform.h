@@ -51,8 +51,9 @@ struct PieceCoefficients {
   Bytes side;                  // what else the way back needs
 };
 
-// Quantiser steps are 2^(index / 8), a number that every machine has alike.
-inline constexpr int largest_step_index = 256;
+// Quantiser steps are 2^(index / 32), a number that every machine has alike.
+inline constexpr int steps_per_octave = 32;
+inline constexpr int largest_step_index = 32 * steps_per_octave;
 [[nodiscard]] double grid_step(int index);
 // The largest step on the grid that is not above; within the grid's ends.
 [[nodiscard]] int step_index_below(double step);
