@@ -76,8 +76,7 @@ TEST(MeshFiles, sequences_survive_gltf) {
 TEST(MeshFiles, frames_come_in_the_natural_order_of_their_names) {
   const TemporaryFolder folder;
   for (const std::string number : {"1", "2", "10", "11", "100"}) {
-    std::ofstream(folder.path() / (number + "f.obj"))
-        << "v " << number << " 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    std::ofstream(folder.path() / (number + "f.obj")) << "v " << number << " 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
   }
   const MeshSequence mesh = read_mesh_sequence(folder.path());
   ASSERT_EQ(mesh.frames, 5);
@@ -121,8 +120,7 @@ TEST(MeshFiles, obj_takes_polygons_slashes_and_relative_numbers) {
 TEST(MeshFiles, bad_obj_is_refused_with_its_line) {
   EXPECT_THAT(parsing_error("v 0 0 0\nv 1 nan 0\n"), testing::HasSubstr("x.obj:2"));
   EXPECT_THAT(parsing_error("v 0 0 0\nv 1 1e300 0\n"), testing::HasSubstr("x.obj:2"));
-  EXPECT_THAT(parsing_error("v 0 0 0\nv 1 0 0\nf 1 2 3\n"),
-              testing::HasSubstr("x.obj:3: vertex 3, expected 1 to 2"));
+  EXPECT_THAT(parsing_error("v 0 0 0\nv 1 0 0\nf 1 2 3\n"), testing::HasSubstr("x.obj:3: vertex 3, expected 1 to 2"));
   EXPECT_THAT(parsing_error("v 0 0 0\nf 1 0 1\n"), testing::HasSubstr("x.obj:2"));
   EXPECT_THAT(parsing_error("v 0 0 0\nf 1 1\n"), testing::HasSubstr("a face with 2 vertices"));
   EXPECT_THAT(parsing_error("v 0 0 0\nf 1 -2 1\n"), testing::HasSubstr("x.obj:2"));
