@@ -37,7 +37,6 @@ struct Limb {
   std::size_t most_turning = 0;
   std::vector<double> weight;           // by frame: 0 where nothing is corrected
   std::vector<Eigen::Vector3d> target;  // by frame
-  std::vector<char> in_contact;
 };
 
 class Solver {
@@ -106,7 +105,6 @@ void add_track(const Clip& clip, const ContactTrack& track, int blending, Limb& 
   for (int i = 0; i < count; ++i) {
     const auto f = static_cast<std::size_t>(track.first + i);
     limb.weight[f] = 1;
-    limb.in_contact[f] = 1;
     limb.target[f] = track.points[static_cast<std::size_t>(i)];
   }
   const int from = std::max(0, track.first - blending);
@@ -135,12 +133,13 @@ std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> track
   // Contacts before their fading, so that no fading takes a frame of a contact.
   for (const ContactTrack& track : tracks) {
     if (out.empty() || out.back().joint != track.joint) {
-      Limb limb{.joint = track.joint,
-                .path = {},
-                .most_turning = turning_joints,
-                .weight = {},
-                .target = {},
-                .in_contact = {}};
+      Limb limb{
+          .joint = track.joint,
+          .path = {},
+          .most_turning = turning_joints,
+          .weight = {},
+          .target = {},
+      };
       for (int j = track.joint; j >= 0; j = clip.skeleton.joints[static_cast<std::size_t>(j)].parent)
         limb.path.push_back(j);
       std::ranges::reverse(limb.path);
@@ -149,7 +148,6 @@ std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> track
       }
       limb.weight.assign(frames, 0.0);
       limb.target.assign(frames, Eigen::Vector3d::Zero());
-      limb.in_contact.assign(frames, 0);
       out.push_back(std::move(limb));
     }
     add_track(clip, track, blending, out.back());

@@ -62,6 +62,15 @@ std::vector<Resting> resting_joints(const JointPositions& positions) {
   return out;
 }
 
+// cm/s, over 80 ms about the frame.
+double speed_at(const JointPositions& positions, double rate_hz, int frame, int joint) {
+  const int reach = std::max(1, static_cast<int>(0.04 * rate_hz));
+  const int first = std::max(0, frame - reach);
+  const int last = std::min(positions.frames - 1, frame + reach);
+  if (first == last) return 0;
+  return (positions.at(last, joint) - positions.at(first, joint)).norm() * rate_hz / (last - first);
+}
+
 std::int8_t steps(double value, double step, int most) {
   return static_cast<std::int8_t>(std::clamp<long>(std::lround(value / step), -most, most));
 }
@@ -69,9 +78,9 @@ std::int8_t steps(double value, double step, int most) {
 }  // namespace
 
 void ContactOptions::validate() const {
-  require_range("near_cm", near_cm, 0, true);
+  require_range("near_cm", near_cm, 0, false);
+  require_range("slow_cm_s", slow_cm_s, 0, false);
   require_range("move_cm", move_cm, 0, true);
-  require_range("fastest_cm_s", fastest_cm_s, 0, true);
   require_range("shortest_s", shortest_s, 0, false);
   require_range("still_cm", still_cm, 0, false);
 }
@@ -79,7 +88,6 @@ void ContactOptions::validate() const {
 std::vector<ContactTrack> find_contacts(const Clip& clip, const ContactOptions& options) {
   options.validate();
   const JointPositions positions = joint_positions(clip);
-  const double farthest = std::min(options.move_cm, options.fastest_cm_s / clip.rate_hz);
   const auto shortest = static_cast<std::size_t>(std::max(2.0, std::ceil(options.shortest_s * clip.rate_hz)));
   std::vector<ContactTrack> out;
   for (const Resting& rest : resting_joints(positions)) {
@@ -91,9 +99,10 @@ std::vector<ContactTrack> find_contacts(const Clip& clip, const ContactOptions& 
     for (int f = 0; f < clip.frames; ++f) {
       const Eigen::Vector3d& p = positions.at(f, rest.joint);
       const bool near = std::abs(p.y() - rest.height) <= options.near_cm;
-      const bool jumped = !track.points.empty() && (p - track.points.back()).norm() > farthest;
-      if (!near || jumped) finish();
-      if (!near) continue;
+      const bool touches = near || speed_at(positions, clip.rate_hz, f, rest.joint) <= options.slow_cm_s;
+      const bool moved = !track.points.empty() && (p - track.points.back()).norm() > options.move_cm;
+      if (!touches || moved) finish();
+      if (!touches) continue;
       if (track.points.empty()) track.first = f;
       track.points.push_back(p);
     }

@@ -3,8 +3,9 @@
 //
 // The floor is found from the data: the heights of a joint that lie together at the bottom are its lowest cluster, the
 // mean of it the height at which it rests; the lowest of these is the floor, and joints that rest at most 15 cm above
-// it can touch the ground. Such a joint is in contact from when it comes near the height where it rests until it leaves
-// it or moves by more than 2.5 cm between two frames, where a new contact begins.
+// it can touch the ground. Such a joint is in contact while it is near the height where it rests (the paper's rule),
+// and while it is slow at any height (on steps, bars and slopes). When it moves by more than 2.5 cm between two frames
+// a new contact begins.
 //
 // A contact is kept as whole steps: at its first frame the difference to where the decoded posture has the joint (8
 // bits of 1 mm), then from frame to frame how it moved (4 bits of 2.5 cm / 8, against what the decoder has, so that
@@ -25,12 +26,12 @@
 namespace kinespace {
 
 struct ContactOptions {
-  double near_cm = 3;         // above the height where it rests, up to which a joint touches the ground, > 0
-  double move_cm = 2.5;       // farthest that a contact moves between two frames, > 0
-  double fastest_cm_s = 1e9;  // and no faster than this, > 0: below the rule above only at high frame rates
-  double shortest_s = 0.1;    // of a contact, >= 0
-  double still_cm = 0.15625;  // a move is coded once the joint is off by this: half a step or more
-  void validate() const;      // throws Error{usage} naming field, value and range
+  double near_cm = 3;        // off the height where it rests, up to which a joint touches the ground, >= 0
+  double slow_cm_s = 20;     // up to which speed (over 80 ms) it does so at any height, >= 0; 0: only a joint at rest
+  double move_cm = 2.5;      // farthest that a contact moves between two frames, > 0
+  double shortest_s = 0.1;   // of a contact, >= 0
+  double still_cm = 0.3125;  // a move is coded once the joint is off by more than this, >= 0; half a step: each nearest
+  void validate() const;     // throws Error{usage} naming field, value and range
 };
 
 // Frames [first, first + points) of one joint.

@@ -20,6 +20,8 @@ namespace {
 
 constexpr std::size_t metric_samples = 256;
 constexpr int planned_components = 16;
+// Slow joints only, and no step of theirs that the eye would miss: half of the bytes of the paper's rule.
+constexpr ContactOptions contact_options{.near_cm = 0, .still_cm = 0.6};
 constexpr double unlikely = 0.62;  // steps; what is smaller will be coded as zero
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -78,7 +80,8 @@ RepeatEncoder::RepeatEncoder(std::span<const Clip> clips, const Preparation& pre
   progress_.check_stop();
   contacts_.resize(clips_.size());
   if (!preparation_.contacts) return;
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { contacts_[c] = find_contacts(clips_[c]); });
+  tbb::parallel_for(std::size_t{0}, clips_.size(),
+                    [&](std::size_t c) { contacts_[c] = find_contacts(clips_[c], contact_options); });
 }
 
 // Moments of the pose vectors and the metric, and with them the exact basis.
@@ -169,7 +172,7 @@ void RepeatEncoder::plan(double step) {
 
 // The reference frames of a window: those of the repeated clips in it, gone on from where there are none.
 WindowPrediction RepeatEncoder::candidate(std::size_t w) const {
-  constexpr double least_share = 0.6;
+  constexpr double least_share = 0.2;
   const WindowPlace& window = windows_[w];
   const auto clip = static_cast<std::size_t>(window.clip);
   const std::int64_t first = starts_[clip] + window.first;
@@ -446,7 +449,7 @@ void RepeatEncoder::measure(Coding& coding) const {
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
     progress_.check_stop();
     Clip decoded = decoder.decode_without_contacts(c);
-    attempt.tables.contacts[c] = code_contacts(contacts_[c], decoded);
+    attempt.tables.contacts[c] = code_contacts(contacts_[c], decoded, contact_options);
     hold_contacts(decoded, contact_tracks(attempt.tables.contacts[c], decoded));
     parts[c] = clip_error(clips_[c], decoded, 0, clips_[c].frames, 0);
   });
