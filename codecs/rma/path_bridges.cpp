@@ -50,14 +50,17 @@ class Bridges {
   // The nearest begin to the lower right of the end of path p.
   void link(int p) {
     const PathPoint end = paths_[static_cast<std::size_t>(p)].points.back();
-    int best = -1, best_length = longest_ + 1;
-    for (int di = 0; di < best_length; ++di) {
+    int best = -1, best_length = 2 * longest_ + 1;
+    for (int di = 0; di <= longest_ && di < best_length; ++di) {
       auto at = std::lower_bound(begins_.begin(), begins_.end(), Begin{end.i + di, end.j, -1}, before);
-      for (; at != begins_.end() && at->i == end.i + di && di + at->j - end.j < best_length; ++at) {
+      for (; at != begins_.end() && at->i == end.i + di && at->j - end.j <= longest_; ++at) {
         if (at->path == p || reached_[static_cast<std::size_t>(at->path)]) continue;
         if (table_.run(at->i) != table_.run(end.i) || table_.run(at->j) != table_.run(end.j)) continue;
-        best = at->path;
-        best_length = di + at->j - end.j;
+        const int length = di + at->j - end.j;
+        if (length < best_length) {
+          best = at->path;
+          best_length = length;
+        }
         break;
       }
     }

@@ -8,8 +8,8 @@
 
 namespace kinespace {
 
-// `longest`: Manhattan length of a bridge, in pixels. The longest paths choose first, each the nearest begin; a begin
-// is reached once. A bridge is filled with the pixels on the line between its ends.
+// `longest`: extent of a bridge along either axis, in pixels. The longest paths choose first, each the nearest begin; a
+// begin is reached once. A bridge is filled with the pixels on the line between its ends.
 [[nodiscard]] std::vector<PosturePath> bridge_paths(const SelfDistance& table, std::vector<PosturePath> paths,
                                                     int longest);
 

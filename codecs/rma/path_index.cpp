@@ -40,10 +40,8 @@ PathIndex::PathIndex(std::span<const PosturePath> paths, int pixels)
     for (std::size_t p = 0; p < paths.size(); ++p) {
       for (const bool swapped : {false, true}) {
         const PathSide whole{paths[p].points, swapped};
-        const std::size_t first = bucket(whole.from(0)), last = bucket(whole.from(whole.size() - 1));
-        for (std::size_t b = first; b <= last; ++b) {
-          use(b, Entry{static_cast<std::uint32_t>(p), swapped, static_cast<std::uint32_t>(first)});
-        }
+        const Entry entry{static_cast<std::uint32_t>(p), swapped, whole.from(0), whole.from(whole.size() - 1)};
+        for (std::size_t b = bucket(entry.first); b <= bucket(entry.last); ++b) use(b, entry);
       }
     }
   };

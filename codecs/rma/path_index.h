@@ -35,7 +35,7 @@ class PathIndex {
     for (std::size_t b = bucket(first); b <= bucket(last - 1); ++b) {
       for (std::size_t e = begin_[b]; e < begin_[b + 1]; ++e) {
         const Entry& entry = entries_[e];
-        if (b != std::max<std::size_t>(bucket(first), entry.first_bucket)) continue;
+        if (b != std::max(bucket(first), bucket(entry.first)) || entry.first >= last || entry.last < first) continue;
         const PathSide part = side(entry).part_from(first, last);
         if (part.size() > 0) visit(part);
       }
@@ -46,9 +46,10 @@ class PathIndex {
   struct Entry {
     std::uint32_t path = 0;
     bool swapped = false;
-    std::uint32_t first_bucket = 0;
+    int first = 0;  // on the axis it is seen from
+    int last = 0;   // included
   };
-  static constexpr int bucket_pixels = 64;
+  static constexpr int bucket_pixels = 16;
   [[nodiscard]] static std::size_t bucket(int pixel) { return static_cast<std::size_t>(pixel / bucket_pixels); }
   [[nodiscard]] PathSide side(const Entry& entry) const { return {paths_[entry.path].points, entry.swapped}; }
 

@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include <tbb/parallel_sort.h>
+
 #include "codecs/rma/option_range.h"
 #include "codecs/rma/path_bridges.h"
 #include "codecs/rma/table_minima.h"
@@ -27,7 +29,7 @@ class PathTracer {
 
   std::vector<PosturePath> trace() {
     std::vector<PosturePath> out;
-    for (const auto& [i, index] : seeds()) {
+    for (const auto& [square, i, index] : seeds()) {
       if (taken_[index]) continue;
       taken_[index] = true;
       const PathPoint seed = point(i, index);
@@ -42,19 +44,24 @@ class PathTracer {
   }
 
  private:
-  // Row and index of the 2D minima, the nearest postures first.
-  [[nodiscard]] std::vector<std::pair<int, std::size_t>> seeds() const {
-    std::vector<std::pair<int, std::size_t>> out;
+  struct Seed {
+    float square = 0;
+    int i = 0;
+    std::size_t index = 0;  // into the labelled pixels
+    bool operator<(const Seed& other) const { return std::tie(square, index) < std::tie(other.square, other.index); }
+  };
+
+  // The 2D minima, the nearest postures first.
+  [[nodiscard]] std::vector<Seed> seeds() const {
+    std::vector<Seed> out;
     for (int i = 0; i < table_.size(); ++i) {
       const auto begin = minima_.row_begin[static_cast<std::size_t>(i)];
       const auto end = minima_.row_begin[static_cast<std::size_t>(i) + 1];
       for (std::size_t p = begin; p < end; ++p) {
-        if (minima_.pixels[p].both) out.emplace_back(i, p);
+        if (minima_.pixels[p].both) out.push_back({minima_.pixels[p].square, i, p});
       }
     }
-    std::sort(out.begin(), out.end(), [this](const auto& a, const auto& b) {
-      return std::tie(minima_.pixels[a.second].square, a.second) < std::tie(minima_.pixels[b.second].square, b.second);
-    });
+    tbb::parallel_sort(out.begin(), out.end());
     return out;
   }
 
@@ -104,12 +111,31 @@ int manhattan(const PosturePath& path) {
   return path.points.back().i - path.points.front().i + path.points.back().j - path.points.front().j;
 }
 
+// The longest paths, as long as they have a pixel on either axis that fewer than `crowd` paths have.
+std::vector<PosturePath> without_crowds(std::vector<PosturePath> paths, int pixels, int crowd) {
+  std::stable_sort(paths.begin(), paths.end(),
+                   [](const PosturePath& a, const PosturePath& b) { return manhattan(a) > manhattan(b); });
+  std::vector<int> count(static_cast<std::size_t>(pixels), 0);
+  std::erase_if(paths, [&](const PosturePath& path) {
+    const PathPoint &begin = path.points.front(), &end = path.points.back();
+    const auto axis = [&](int first, int last) { return std::span(count).subspan(first, last - first + 1); };
+    const auto crowded = [crowd](int c) { return c >= crowd; };
+    const auto i = axis(begin.i, end.i), j = axis(begin.j, end.j);
+    if (std::all_of(i.begin(), i.end(), crowded) && std::all_of(j.begin(), j.end(), crowded)) return true;
+    for (int& c : i) ++c;
+    for (int& c : j) ++c;
+    return false;
+  });
+  return paths;
+}
+
 }  // namespace
 
 void PathOptions::validate() const {
   require_option("threshold", threshold, 1e-6, 2);
   require_option("bridge_s", bridge_s, 0, 10);
   require_option("length_s", length_s, 0.05, 60);
+  require_option("crowd", crowd, 1, 100'000);
   require_option("lag_s", lag_s, 1e-6, 60);
 }
 
@@ -120,8 +146,11 @@ std::vector<PosturePath> find_posture_paths(const SelfDistance& table, const Pat
   const TableMinima minima = find_minima(table, options.threshold * table.typical(), lag);
   std::vector<PosturePath> paths = PathTracer(table, minima).trace();
   const auto pixels = [&](double seconds) { return static_cast<int>(std::lround(seconds * table.pixel_rate_hz())); };
+  // What is much too short is chance, and there is much of it.
+  std::erase_if(paths, [&](const PosturePath& path) { return manhattan(path) < pixels(options.length_s) / 4; });
   paths = bridge_paths(table, std::move(paths), pixels(options.bridge_s));
   std::erase_if(paths, [&](const PosturePath& path) { return manhattan(path) < pixels(options.length_s); });
+  paths = without_crowds(std::move(paths), table.size(), options.crowd);
   std::sort(paths.begin(), paths.end(), [](const PosturePath& a, const PosturePath& b) {
     const PathPoint &p = a.points.front(), &q = b.points.front();
     return std::tie(p.i, p.j) < std::tie(q.i, q.j);

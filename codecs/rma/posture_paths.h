@@ -17,11 +17,12 @@
 namespace kinespace {
 
 struct PathOptions {
-  double threshold = 0.45;  // > 0 to 2: dissimilar is a distance above this share of the table's typical distance
-  double bridge_s = 0.3;    // 0 to 10: Manhattan length of the longest bridge
-  double length_s = 0.6;    // 0.05 to 60: Manhattan length of the shortest path
-  double lag_s = 0.2;       // > 0 to 60: frames nearer in time than this are not compared: neighbours are always alike
-  void validate() const;    // throws Error{usage} naming field, value and range
+  double threshold = 0.3;  // > 0 to 2: dissimilar is a distance above this share of the table's typical distance
+  double bridge_s = 0.3;   // 0 to 10: extent of the longest bridge along either axis
+  double length_s = 0.6;   // 0.05 to 60: Manhattan length of the shortest path
+  int crowd = 100;        // 1 to 100 000: of paths over frames that so many longer paths lead from already none is kept
+  double lag_s = 0.2;     // > 0 to 60: frames nearer in time than this are not compared: neighbours are always alike
+  void validate() const;  // throws Error{usage} naming field, value and range
 };
 
 struct PathPoint {

@@ -51,6 +51,18 @@ std::vector<int> cuts_of_run(const std::vector<int>& ends, int first, int last, 
   return out;
 }
 
+// Cuts no further apart than `most`.
+std::vector<int> with_more_cuts(const std::vector<int>& cuts, int most) {
+  std::vector<int> out(cuts.begin(), cuts.begin() + 1);
+  for (std::size_t c = 1; c < cuts.size(); ++c) {
+    const int length = cuts[c] - cuts[c - 1], parts = (length + most - 1) / most;
+    for (int part = 1; part <= parts; ++part) {
+      out.push_back(cuts[c - 1] + static_cast<int>(static_cast<std::int64_t>(length) * part / parts));
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<PixelInterval> candidate_intervals(const SelfDistance& table, std::span<const PosturePath> paths,
@@ -61,12 +73,13 @@ std::vector<PixelInterval> candidate_intervals(const SelfDistance& table, std::s
     const int first = table.run_first_pixel(run);
     int last = first;
     while (last < table.size() && table.run(last) == run) ++last;
-    const std::vector<int> cuts = cuts_of_run(ends, first, last, shortest);
+    const std::vector<int> cuts =
+        with_more_cuts(cuts_of_run(ends, first, last, shortest), std::max(shortest, longest / 2));
     for (std::size_t c = 0; c + 1 < cuts.size(); ++c) {
       for (const int span : spans) {
         if (c + static_cast<std::size_t>(span) >= cuts.size()) break;
         const int length = cuts[c + static_cast<std::size_t>(span)] - cuts[c];
-        if (length < shortest || (span > 1 && length > longest)) continue;
+        if (length < shortest || length > longest) continue;
         out.push_back({cuts[c], cuts[c] + length});
       }
     }

@@ -14,9 +14,9 @@ struct PixelInterval {
   int last = 0;  // exclusive
 };
 
-// The ends of all paths on both axes are cuts; of cuts nearer than `shortest` pixels those that most ends fall on stay.
-// The intervals between two cuts of one run, from `shortest` to `longest` pixels (an interval between neighbouring cuts
-// however long), in time.
+// The ends of all paths on both axes are cuts; of cuts nearer than `shortest` pixels those that most ends fall on stay,
+// and where cuts are further apart than half of `longest` more are set. The intervals between two cuts of one run, from
+// `shortest` to `longest` pixels, in time.
 [[nodiscard]] std::vector<PixelInterval> candidate_intervals(const SelfDistance& table,
                                                              std::span<const PosturePath> paths, int shortest,
                                                              int longest);

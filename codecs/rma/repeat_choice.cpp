@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <queue>
 #include <tuple>
+#include <unordered_set>
 
 #include <tbb/parallel_for.h>
 
@@ -39,11 +41,15 @@ void spread_over(int count, const Use& use) {
   for (int k = 0; k < taken; ++k) use(static_cast<int>((static_cast<std::int64_t>(2 * k + 1) * count) / (2 * taken)));
 }
 
-double path_cost(const PathSide& part, int pixels, int stride, const ChoiceOptions& options) {
+double overhead(const SelfDistance& table, double seconds) {
+  return seconds * table.pixel_rate_hz() * table.stride() * table.typical();
+}
+
+double path_cost(const SelfDistance& table, const PathSide& part, int pixels, const ChoiceOptions& options) {
   Spread spread;
   spread_over(static_cast<int>(part.size()),
               [&](int k) { spread.add(static_cast<double>(part.points[static_cast<std::size_t>(k)].distance)); });
-  return spread.deviation() * pixels * stride + options.repeated_overhead;
+  return spread.deviation() * pixels * table.stride() + overhead(table, options.repeated_overhead_s);
 }
 
 // One stretch that a path offers as a repetition, cut to what is free.
@@ -73,13 +79,17 @@ class Chooser {
     std::vector<double> gains(candidates.size());
     tbb::parallel_for(std::size_t{0}, candidates.size(),
                       [&](std::size_t c) { gains[c] = evaluate(candidates[c]).gain; });
-    for (std::size_t c = 0; c < candidates.size(); ++c) push(candidates[c], gains[c]);
+    for (std::size_t c = 0; c < candidates.size(); ++c) {
+      if (is_new(candidates[c])) push(candidates[c], gains[c]);
+    }
     std::vector<PrimaryChoice> out;
     while (!queue_.empty()) {
       const Entry top = queue_.top();
       queue_.pop();
       if (!is_free(top.interval)) {
-        for (const PixelInterval& rest : free_parts(top.interval)) push(rest, evaluate(rest).gain);
+        for (const PixelInterval& rest : free_parts(top.interval)) {
+          if (is_new(rest)) push(rest, evaluate(rest).gain);
+        }
         continue;
       }
       const Evaluation now = evaluate(top.interval);
@@ -109,6 +119,11 @@ class Chooser {
   }
   void push(const PixelInterval& interval, double gain) {
     if (gain >= options_.least_gain) queue_.push({gain, interval});
+  }
+  // What is left of many candidates is the same.
+  bool is_new(const PixelInterval& interval) {
+    return seen_.insert((static_cast<std::uint64_t>(interval.first) << 32U) | static_cast<std::uint64_t>(interval.last))
+        .second;
   }
   [[nodiscard]] bool is_taken(int pixel) const { return taken_[static_cast<std::size_t>(pixel)] != 0; }
   [[nodiscard]] bool is_free(const PixelInterval& interval) const { return first_taken(interval) == interval.last; }
@@ -152,7 +167,7 @@ class Chooser {
       Offer offer{side.part_to(free.first, free.last), free.first, free.last, 0, 0};
       if (offer.part.size() == 0) return;
       offer.unique_cost = primary_cost(table_, free.first, free.last, options_);
-      offer.repeated_cost = path_cost(offer.part, free.last - free.first, table_.stride(), options_);
+      offer.repeated_cost = path_cost(table_, offer.part, free.last - free.first, options_);
       if (offer.saving() > 0) out.push_back(std::move(offer));
     });
     std::stable_sort(out.begin(), out.end(), [](const Offer& a, const Offer& b) { return a.saving() > b.saving(); });
@@ -201,6 +216,7 @@ class Chooser {
   PathIndex index_;
   std::vector<std::uint8_t> taken_;
   int shortest_;
+  std::unordered_set<std::uint64_t> seen_;
   std::priority_queue<Entry> queue_;
 };
 
@@ -210,8 +226,8 @@ void ChoiceOptions::validate() const {
   require_option("shortest_s", shortest_s, 0.02, 10);
   require_option("longest_s", longest_s, shortest_s, 600);
   require_option("least_gain", least_gain, 1, 1e9);
-  require_option("primary_overhead", primary_overhead, 0, 1e9);
-  require_option("repeated_overhead", repeated_overhead, 0, 1e9);
+  require_option("primary_overhead_s", primary_overhead_s, 0, 60);
+  require_option("repeated_overhead_s", repeated_overhead_s, 0, 60);
 }
 
 double primary_cost(const SelfDistance& table, int first, int last, const ChoiceOptions& options) {
@@ -219,14 +235,14 @@ double primary_cost(const SelfDistance& table, int first, int last, const Choice
   Spread spread;
   spread_over(last - first, [&](int k) { spread.add(static_cast<double>(table.at(middle, first + k))); });
   return spread.deviation() * (last - first) * table.stride() + static_cast<double>(table.at(middle, first)) +
-         options.primary_overhead;
+         overhead(table, options.primary_overhead_s);
 }
 
-double repeated_cost(std::span<const float> distances, int stride, const ChoiceOptions& options) {
+double repeated_cost(const SelfDistance& table, std::span<const float> distances, const ChoiceOptions& options) {
   Spread spread;
   const int count = static_cast<int>(distances.size());
   spread_over(count, [&](int k) { spread.add(static_cast<double>(distances[static_cast<std::size_t>(k)])); });
-  return spread.deviation() * count * stride + options.repeated_overhead;
+  return spread.deviation() * count * table.stride() + overhead(table, options.repeated_overhead_s);
 }
 
 std::vector<PrimaryChoice> choose_repeats(const SelfDistance& table, std::span<const PosturePath> paths,

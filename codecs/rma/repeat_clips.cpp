@@ -4,6 +4,10 @@
 #include <cmath>
 #include <iterator>
 
+#include <tbb/parallel_for.h>
+
+#include "codecs/rma/reference_warp.h"
+
 namespace kinespace {
 namespace {
 
@@ -11,18 +15,17 @@ bool is_repeated(const RepeatClip& clip) {
   return clip.kind == RepeatClip::Kind::repeated;
 }
 
-int run_of(const SelfDistance& distances, int pixel) {
-  return distances.run(pixel);
-}
+// Seconds, and share of the table's typical distance.
+constexpr double warp_reach_s = 0.05, jump_cost = 0.05;
 
 RepeatClip clip_of_pixels(const SelfDistance& distances, int group, int first, int last) {
-  const int run = run_of(distances, first);
+  const int run = distances.run(first);
   return {.group = group, .first = distances.frame(first, run), .last = distances.frame(last, run)};
 }
 
-// The frame, between pixels too, that each frame of a repeated clip refers to.
-std::vector<std::int64_t> frame_references(const SelfDistance& distances, const RepeatClip& clip,
-                                           const RepeatClip& primary, int primary_pixel, const Repetition& repetition) {
+// The frame of the primary clip that each frame of a repeated clip refers to as the path has it, between pixels too.
+std::vector<std::int64_t> path_references(const SelfDistance& distances, const RepeatClip& clip,
+                                          const RepeatClip& primary, int primary_pixel, const Repetition& repetition) {
   std::vector<std::int64_t> out(static_cast<std::size_t>(clip.frames()));
   const int stride = distances.stride();
   const auto& pixels = repetition.reference;
@@ -32,7 +35,7 @@ std::vector<std::int64_t> frame_references(const SelfDistance& distances, const 
     const double here = static_cast<double>(pixels[pixel]);
     const double next = pixel + 1 < pixels.size() ? static_cast<double>(pixels[pixel + 1]) : here + 1;
     const double offset = (here + part * (next - here) - primary_pixel) * stride;
-    out[f] = std::clamp<std::int64_t>(primary.first + std::llround(offset), primary.first, primary.last - 1);
+    out[f] = std::clamp<std::int64_t>(std::llround(offset), 0, primary.frames() - 1);
   }
   return out;
 }
@@ -56,30 +59,46 @@ void extend(RepeatClip& clip, std::int64_t first, std::int64_t last, FrameRange 
 }  // namespace
 
 ClipCollector::ClipCollector(const FrameTable& table, double shortest_s)
-    : shortest_(std::llround(shortest_s * table.rate_hz)) {}
+    : table_(table), shortest_(std::llround(shortest_s * table.rate_hz)) {}
 
-void ClipCollector::add(int group, const SelfDistance& distances, std::span<const PrimaryChoice> choices) {
-  std::vector<std::vector<RepeatClip>> held(static_cast<std::size_t>(distances.run_count()));
-  const auto hold = [&](RepeatClip clip, int pixel) {
-    held[static_cast<std::size_t>(run_of(distances, pixel))].push_back(std::move(clip));
-  };
-  for (const PrimaryChoice& choice : choices) {
-    RepeatClip primary = clip_of_pixels(distances, group, choice.first, choice.last);
-    primary.kind = RepeatClip::Kind::primary;
-    primary.primary = static_cast<int>(primaries_.size());
-    primaries_.push_back({primary.first, primary.last});
-    for (const Repetition& repetition : choice.repetitions) {
-      RepeatClip clip = clip_of_pixels(distances, group, repetition.first, repetition.last);
-      clip.kind = RepeatClip::Kind::repeated;
-      clip.primary = primary.primary;
-      clip.reference = frame_references(distances, clip, primary, choice.first, repetition);
-      hold(std::move(clip), repetition.first);
+void ClipCollector::add(const GroupTable& in, std::span<const PrimaryChoice> choices) {
+  std::vector<std::vector<RepeatClip>> found(choices.size());
+  tbb::parallel_for(std::size_t{0}, choices.size(), [&](std::size_t c) { found[c] = clips_of(in, choices[c]); });
+  std::vector<std::vector<RepeatClip>> held(static_cast<std::size_t>(in.distances.run_count()));
+  for (std::size_t c = 0; c < choices.size(); ++c) {
+    const int number = static_cast<int>(primaries_.size());
+    primaries_.push_back({found[c].front().first, found[c].front().last});
+    for (std::size_t k = 0; k < found[c].size(); ++k) {
+      const int pixel = k == 0 ? choices[c].first : choices[c].repetitions[k - 1].first;
+      found[c][k].primary = number;
+      held[static_cast<std::size_t>(in.distances.run(pixel))].push_back(std::move(found[c][k]));
     }
-    hold(std::move(primary), choice.first);
   }
-  for (int run = 0; run < distances.run_count(); ++run) {
-    add_run(group, distances.run_frames(run), std::move(held[static_cast<std::size_t>(run)]));
+  for (int run = 0; run < in.distances.run_count(); ++run) {
+    add_run(in.group, in.distances.run_frames(run), std::move(held[static_cast<std::size_t>(run)]));
   }
+}
+
+// The primary clip, then its repetitions.
+std::vector<RepeatClip> ClipCollector::clips_of(const GroupTable& in, const PrimaryChoice& choice) const {
+  std::vector<RepeatClip> out;
+  out.push_back(clip_of_pixels(in.distances, in.group, choice.first, choice.last));
+  const FrameRange range{out[0].first, out[0].last};
+  out[0].kind = RepeatClip::Kind::primary;
+  const Eigen::MatrixXf primary = in.space.project(table_, std::span(&range, 1));
+  // How far a path at the table's rate may be off; what a jump in the reference must save.
+  const auto jump = static_cast<float>(std::pow(jump_cost * in.distances.typical(), 2));
+  const WarpOptions warp{.reach = in.distances.stride() + std::llround(warp_reach_s * table_.rate_hz), .jump = jump};
+  for (const Repetition& repetition : choice.repetitions) {
+    RepeatClip clip = clip_of_pixels(in.distances, in.group, repetition.first, repetition.last);
+    clip.kind = RepeatClip::Kind::repeated;
+    const FrameRange own{clip.first, clip.last};
+    clip.reference = warp_references(in.space.project(table_, std::span(&own, 1)), primary,
+                                     path_references(in.distances, clip, out[0], choice.first, repetition), warp);
+    for (std::int64_t& frame : clip.reference) frame += out[0].first;
+    out.push_back(std::move(clip));
+  }
+  return out;
 }
 
 void ClipCollector::add_unique(int group, std::span<const FrameRange> ranges) {

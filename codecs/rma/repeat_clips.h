@@ -8,12 +8,19 @@
 
 namespace kinespace {
 
+// One self-distance table and what it was made from.
+struct GroupTable {
+  int group = 0;
+  const GroupSpace& space;
+  const SelfDistance& distances;
+};
+
 class ClipCollector {
  public:
   // Unique clips shorter than `shortest_s` are merged with a neighbour where there is one.
   ClipCollector(const FrameTable& table, double shortest_s);
 
-  void add(int group, const SelfDistance& distances, std::span<const PrimaryChoice> choices);
+  void add(const GroupTable& in, std::span<const PrimaryChoice> choices);
   void add_unique(int group, std::span<const FrameRange> ranges);
 
   // All clips, in time.
@@ -22,6 +29,9 @@ class ClipCollector {
  private:
   void add_run(int group, FrameRange range, std::vector<RepeatClip> held);
 
+  [[nodiscard]] std::vector<RepeatClip> clips_of(const GroupTable& in, const PrimaryChoice& choice) const;
+
+  const FrameTable& table_;
   std::int64_t shortest_;
   std::vector<RepeatClip> clips_;      // until finish(), `primary` of primary and repeated clips is an index of
   std::vector<FrameRange> primaries_;  // these: primary clips as they were chosen

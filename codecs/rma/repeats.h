@@ -26,8 +26,8 @@ struct RepeatOptions {
   SegmentationOptions segmentation = {};
   GroupingOptions grouping = {};
   double variance = 0.95;     // 0.5 to 1: share of a group's variance that its space keeps (the paper: 0.95, 0.98)
-  double table_rate_hz = 30;  // 1 to 1000: the self-distance table is computed at this rate, or at the clips' if lower
-  int table_frames = 20'000;  // 100 to 200 000: a larger table is computed at a lower rate still
+  double table_rate_hz = 15;  // 1 to 1000: the self-distance table is computed at this rate, or at the clips' if lower
+  int table_frames = 16'000;  // 100 to 200 000: a larger table is computed at a lower rate still
   PathOptions paths = {};
   ChoiceOptions choice = {};
   bool find_repeats = true;  // false: every clip is unique, one for each range of a group (what repetition gains)

@@ -121,13 +121,18 @@ void add_clip_cuts(const FrameTable& table, FrameRange clip, const Pace& pace, d
   }
 }
 
-// Of the cuts inside a clip, those that are `apart` from each other and from its ends.
+// The segments between the cuts of a clip: cuts nearer than `apart` are one, at their mean, and none is that near to an
+// end of the clip.
 std::vector<FrameRange> segments_between(FrameRange clip, std::vector<std::int64_t> cuts, std::int64_t apart) {
+  apart = std::max<std::int64_t>(apart, 1);
   std::sort(cuts.begin(), cuts.end());
   std::vector<FrameRange> out;
   std::int64_t first = clip.first;
-  for (const std::int64_t cut : cuts) {
-    if (cut - first < std::max<std::int64_t>(apart, 1) || clip.last - cut < std::max<std::int64_t>(apart, 1)) continue;
+  for (std::size_t c = 0; c < cuts.size();) {
+    std::int64_t sum = 0, count = 0;
+    for (const std::int64_t begin = cuts[c]; c < cuts.size() && cuts[c] - begin < apart; ++c, ++count) sum += cuts[c];
+    const std::int64_t cut = sum / count;
+    if (cut - first < apart || clip.last - cut < apart) continue;
     out.push_back({first, cut});
     first = cut;
   }

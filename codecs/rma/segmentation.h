@@ -6,8 +6,8 @@
 // squared Mahalanobis distance of the next `window_s` of motion under that model. While the behaviour lasts H falls, or
 // stays, as K grows by `step_s`; where another behaviour begins it rises: a rise of more than `rise` above the lowest
 // value since the last cut, followed by a fall, is a cut at the peak, and the model starts again there. All this
-// forward and backward in time; the cuts of both directions are united, and of cuts closer than `apart_s` the first
-// stays.
+// forward and backward in time; the cuts of both directions are united, and cuts closer than `apart_s` become one at
+// their mean (forward in time a cut comes a little early, backward a little late).
 //
 // H is in units of its expected value, 1 for motion that the model explains; Barbic's rise of 15 stands for frames of
 // some 60 numbers, hence the default.
