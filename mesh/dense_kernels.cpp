@@ -9,6 +9,9 @@ namespace {
 
 constexpr std::ptrdiff_t wide = 8;  // results in a row of a tile
 constexpr std::ptrdiff_t high = 4;
+constexpr std::ptrdiff_t row_block = 64;
+constexpr std::ptrdiff_t columns_at_once = 128;
+constexpr std::ptrdiff_t widest = 32;
 
 template <std::ptrdiff_t Height, std::ptrdiff_t Width>
 [[gnu::always_inline]] inline void add_tile(std::ptrdiff_t n, ConstRows a, ConstRows b, Rows out) {
@@ -32,26 +35,25 @@ template <std::ptrdiff_t Height>
   for (; j < q; ++j) add_tile<Height, 1>(n, a, {b.data + j, b.stride}, {out.data + j, out.stride});
 }
 
-template <std::ptrdiff_t Height, std::ptrdiff_t Width>
-[[gnu::always_inline]] inline void subtract_tile(std::ptrdiff_t p, ConstRows a, ConstRows c, Rows b) {
-  double sum[Height][Width] = {};
-  for (std::ptrdiff_t k = 0; k < p; ++k) {
-    const double* const y = c.data + k * c.stride;
-    for (std::ptrdiff_t i = 0; i < Height; ++i) {
-      const double x = a.data[i * a.stride + k];
-      for (std::ptrdiff_t j = 0; j < Width; ++j) sum[i][j] += x * y[j];
-    }
-  }
-  for (std::ptrdiff_t i = 0; i < Height; ++i) {
-    for (std::ptrdiff_t j = 0; j < Width; ++j) b.data[i * b.stride + j] -= sum[i][j];
-  }
-}
-
+// A band of up to `high` rows of A, turned so that its columns follow each other, times C.
 template <std::ptrdiff_t Height>
 [[gnu::always_inline]] inline void subtract_band(std::ptrdiff_t p, std::ptrdiff_t q, ConstRows a, ConstRows c, Rows b) {
-  std::ptrdiff_t j = 0;
-  for (; j + wide <= q; j += wide) subtract_tile<Height, wide>(p, a, {c.data + j, c.stride}, {b.data + j, b.stride});
-  for (; j < q; ++j) subtract_tile<Height, 1>(p, a, {c.data + j, c.stride}, {b.data + j, b.stride});
+  double turned[columns_at_once * Height];
+  double product[Height * widest];
+  for (std::ptrdiff_t left = 0; left < q; left += widest) {
+    const std::ptrdiff_t width = std::min(widest, q - left);
+    std::fill_n(product, Height * widest, 0.0);
+    for (std::ptrdiff_t first = 0; first < p; first += columns_at_once) {
+      const std::ptrdiff_t count = std::min(columns_at_once, p - first);
+      for (std::ptrdiff_t i = 0; i < Height; ++i) {
+        for (std::ptrdiff_t k = 0; k < count; ++k) turned[k * Height + i] = a.data[i * a.stride + first + k];
+      }
+      add_band<Height>(count, width, {turned, Height}, {c.data + first * c.stride + left, c.stride}, {product, widest});
+    }
+    for (std::ptrdiff_t i = 0; i < Height; ++i) {
+      for (std::ptrdiff_t j = 0; j < width; ++j) b.data[i * b.stride + left + j] -= product[i * widest + j];
+    }
+  }
 }
 
 }  // namespace

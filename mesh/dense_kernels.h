@@ -1,15 +1,14 @@
 // Products of tall matrices that every machine computes to the same bits.
 //
 // A library's product adds up in an order that depends on the processor's vectors and caches. Here the order is written
-// down: over rows in blocks of `row_block`, within a block one after the other; vectors run along independent results.
+// down: what is summed comes in blocks of fixed size, within a block one after the other; vectors run along independent
+// results.
 // All matrices are stored by rows; `stride` is the distance of rows in numbers.
 #pragma once
 
 #include <cstddef>
 
 namespace kinespace {
-
-inline constexpr std::ptrdiff_t row_block = 64;
 
 struct ConstRows {
   const double* data;

@@ -69,7 +69,7 @@ Pairs lanczos_pairs(const SparseMatrix& matrix, int count, double tolerance) {
   const double mean_diagonal = matrix.diagonal().mean();
   const double sigma = -1e-6 * (mean_diagonal > 0 ? mean_diagonal : 1);
   ShiftedInverse inverse(matrix);
-  const auto space = std::min<Eigen::Index>(matrix.rows(), count + std::max(20, count * 2 / 5));
+  const auto space = std::min<Eigen::Index>(matrix.rows(), count + std::max(20, count * 3 / 5));
   Spectra::SymEigsShiftSolver<ShiftedInverse> solver(inverse, count, space, sigma);
   solver.init();
   solver.compute(Spectra::SortRule::LargestMagn, most_restarts, tolerance, Spectra::SortRule::SmallestAlge);
