@@ -136,6 +136,26 @@ void measure_largest(const CodecData& data, double target_cm, std::size_t every,
        .higher_is_better = true});
 }
 
+double bytes_at(std::string_view codec, const CodecData& data, double error_cm) {
+  double out = 0;
+  for (const auto& clips : data.streams) {
+    out += static_cast<double>(encode(codec, clips, {.target = {.mean_error_cm = error_cm}}).size());
+  }
+  return out;
+}
+
+// Functions fitted to the motion against fixed ones over whole clips, quantised and coded alike.
+void measure_analytic(const CodecData& data, double error_cm, BenchReport& report) {
+  const double ours = bytes_at("motion-space", data, error_cm);
+  for (const auto& [codec, bar] : {std::pair("fourier", 1.0 / 3), std::pair("legendre", 1.0 / 2)}) {
+    report.results.push_back({.name = fmt::format("motion-space: bytes over those of {} at {} cm", codec, error_cm),
+                              .data = data.name,
+                              .value = ours / bytes_at(codec, data, error_cm),
+                              .unit = "x",
+                              .bar = bar});
+  }
+}
+
 // Climbing, jumping and turning, walking, running, jumping, bending: what the papers' clips do.
 std::vector<fs::path> paper_clips(const BenchOptions& options) {
   if (!options.clips.empty()) return options.clips;
@@ -167,6 +187,7 @@ void add_motion_space(const BenchOptions& options, BenchReport& report) {
     measure(cmu, bar, report);
   }
   measure_largest(cmu, 1, 4, report);
+  for (const double error_cm : {0.35, 0.9}) measure_analytic(cmu, error_cm, report);
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
-#include "codecs/library_basis.h"
+#include "cli/stream_file.h"
 #include "codecs/registry.h"
 #include "motion/read.h"
 
@@ -98,13 +98,10 @@ std::vector<fs::path> output_files(const std::vector<Clip>& clips, const DecodeO
 }
 
 void run_decode(const DecodeOptions& options) {
-  const MappedFile file(options.stream);
   const auto start = std::chrono::steady_clock::now();
-  std::optional<MotionSpaceBasis> basis;
-  const std::string id = basis_of(file.bytes(), options.stream.string());
-  if (options.basis && !id.empty()) basis = library_basis_by_id(*options.basis, id);
-  const auto reader = open_stream(file.bytes(), options.stream.string(), basis ? &*basis : nullptr);
-  const std::vector<Clip> clips = decode_clips(*reader, options);
+  const StreamFile stream(options.stream, options.basis);
+  const StreamReader& reader = stream.reader();
+  const std::vector<Clip> clips = decode_clips(reader, options);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::vector<fs::path> files = output_files(clips, options);
   double frames = 0;
@@ -115,8 +112,8 @@ void run_decode(const DecodeOptions& options) {
     frames += clips[c].frames;
   }
   const Json result{{"output", options.output.string()},           {"clips", clips.size()},
-                    {"frames", static_cast<std::int64_t>(frames)}, {"levels", reader->levels()},
-                    {"complete", reader->stream().complete()},     {"decode_frames_per_s", frames / seconds}};
+                    {"frames", static_cast<std::int64_t>(frames)}, {"levels", reader.levels()},
+                    {"complete", reader.stream().complete()},     {"decode_frames_per_s", frames / seconds}};
   options.json ? print_json(result) : print_fields(result);
 }
 

@@ -2,12 +2,14 @@
 #include <array>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/stream_file.h"
 #include "codecs/registry.h"
 #include "fpca/library_view.h"
 #include "motion/read.h"
@@ -17,9 +19,14 @@ namespace {
 
 // What `info` can describe. The first row that claims a file describes it; a clip, last, claims every file, so that a
 // file of no known kind gets the clip reader's message.
+struct InfoOptions {
+  std::filesystem::path file;
+  std::optional<std::filesystem::path> basis;  // a library, for a stream that was made with one
+  bool json = false;
+};
 struct Describer {
   bool (*claims)(const std::filesystem::path& file);
-  Json (*describe)(const std::filesystem::path& file);
+  Json (*describe)(const InfoOptions& options);
 };
 
 // The unit in which a skeleton of this height would be a person's, for files that do not say what they use.
@@ -36,8 +43,8 @@ std::string guess_unit(double height) {
   return "unknown";
 }
 
-Json describe_clip(const std::filesystem::path& file) {
-  const Clip clip = read_clip(file);
+Json describe_clip(const InfoOptions& options) {
+  const Clip clip = read_clip(options.file);
   const double height = clip.skeleton.rest_height();
   return {{"kind", "clip"},
           {"name", clip.name},
@@ -48,7 +55,7 @@ Json describe_clip(const std::filesystem::path& file) {
           {"rotating_joints", clip.skeleton.rotating_joints().size()},
           {"height_cm", height},
           {"unit_guess", guess_unit(height)},
-          {"bytes", std::filesystem::file_size(file)}};
+          {"bytes", std::filesystem::file_size(options.file)}};
 }
 
 bool is_library(const std::filesystem::path& file) {
@@ -71,8 +78,8 @@ Json describe_space(LibraryView& view, const SpaceRow& row) {
           {"variance", space.variance_covered()}};
 }
 
-Json describe_library(const std::filesystem::path& file) {
-  LibraryView view(file);
+Json describe_library(const InfoOptions& options) {
+  LibraryView view(options.file);
   const Library& library = view.library();
   const LibraryTotals totals = library.totals();
   Json clips = Json::array();
@@ -112,9 +119,9 @@ bool is_stream(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(file) && Bitstream::has_magic(MappedFile(file).bytes());
 }
 
-Json describe_stream(const std::filesystem::path& file) {
-  const MappedFile mapped(file);
-  const auto reader = open_stream(mapped.bytes(), file.string());
+Json describe_stream(const InfoOptions& options) {
+  const StreamFile file(options.file, options.basis);
+  const StreamReader* reader = &file.reader();
   const Bitstream& stream = reader->stream();
   const Skeleton& skeleton = reader->skeleton(0);
   std::int64_t frames = 0;
@@ -135,8 +142,8 @@ Json describe_stream(const std::filesystem::path& file) {
           {"height_cm", skeleton.rest_height()},
           {"levels", reader->levels()},
           {"complete", stream.complete()},
-          {"bytes", mapped.bytes().size()},
-          {"bytes_per_frame", static_cast<double>(mapped.bytes().size()) / static_cast<double>(frames)},
+          {"bytes", file.bytes()},
+          {"bytes_per_frame", static_cast<double>(file.bytes()) / static_cast<double>(frames)},
           {"mean_joint_error_cm", stream.error().mean_joint_error_cm},
           {"max_joint_error_cm", stream.error().max_joint_error_cm},
           {"shell_error_cm", stream.error().shell_error_cm},
@@ -149,11 +156,11 @@ constexpr std::array describers{
     Describer{[](const std::filesystem::path&) { return true; }, describe_clip},
 };
 
-void run_info(const std::filesystem::path& file, bool json) {
+void run_info(const InfoOptions& options) {
   for (const Describer& describer : describers) {
-    if (!describer.claims(file)) continue;
-    const Json description = describer.describe(file);
-    json ? print_json(description) : print_fields(description);
+    if (!describer.claims(options.file)) continue;
+    const Json description = describer.describe(options);
+    options.json ? print_json(description) : print_fields(description);
     return;
   }
 }
@@ -161,15 +168,12 @@ void run_info(const std::filesystem::path& file, bool json) {
 }  // namespace
 
 void add_info(CLI::App& app, Session& /*session*/) {
-  struct Options {
-    std::filesystem::path file;
-    bool json = false;
-  };
   CLI::App* command = app.add_subcommand("info", "What is in a file");
-  const auto options = std::make_shared<Options>();
+  const auto options = std::make_shared<InfoOptions>();
   command->add_option("FILE", options->file, "A clip (.bvh, .amc), a library (.kspace) or a stream (.ksm)")->required();
+  command->add_option("--basis", options->basis, "The library that a stream was encoded with, if it was with one");
   command->add_flag("--json", options->json, "Print it as one JSON object");
-  command->callback([options] { run_info(options->file, options->json); });
+  command->callback([options] { run_info(*options); });
 }
 
 }  // namespace kinespace::cli
