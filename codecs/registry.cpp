@@ -9,6 +9,7 @@
 #include "codecs/baselines/channel_codec.h"
 #include "codecs/baselines/channel_transform.h"
 #include "codecs/baselines/raw_codec.h"
+#include "codecs/clip_pca_codec.h"
 #include "codecs/motion_space_codec.h"
 #include "codecs/qbc_codec.h"
 #include "codecs/rma/rma_codec.h"
@@ -103,8 +104,9 @@ std::span<const Codec* const> all_codecs() {
   static const QbcCodec qbc;
   static const RawCodec raw_zstd(Packer::zstd), raw_xz(Packer::xz);
   static const RmaCodec rma;
-  static const std::array<const Codec*, 10> codecs{&motion_space, &rma,      &qbc,     &pca,      &dwt,   &awt,
-                                                  &fourier,      &legendre, &raw_zstd, &raw_xz};
+  static const ClipPcaCodec clip_pca;
+  static const std::array<const Codec*, 11> codecs{&motion_space, &rma,     &clip_pca, &qbc,      &pca,   &dwt,
+                                                   &awt,          &fourier, &legendre, &raw_zstd, &raw_xz};
   return codecs;
 }
 

@@ -39,7 +39,7 @@ class RootWriter {
 
 Clip clip_from_markers(const ClipEntry& entry, const Skeleton& skeleton, const MarkerRig& rig,
                        const ReferencePose& reference, const RootAlignment& alignment,
-                       const std::function<void(int, std::span<double>)>& markers) {
+                       const std::function<void(int, std::span<double>)>& markers, bool with_joints) {
   Clip out = make_clip(entry.name, skeleton, entry.rate_hz, entry.frames);
   const std::vector<int> joints = skeleton.rotating_joints();
   out.require_translation_track(joints.front());
@@ -47,7 +47,8 @@ Clip clip_from_markers(const ClipEntry& entry, const Skeleton& skeleton, const M
   RootWriter root(out, joints.front());
   const Eigen::Vector3d start = entry.placement.start_cm();
   const Eigen::Quaterniond turn = entry.placement.turn();
-  std::vector<double> values(static_cast<std::size_t>(rig.dimensions()));
+  const auto d = static_cast<std::size_t>(rig.dimensions());
+  std::vector<double> values(d + (with_joints ? 3 * joints.size() : 0));
   std::vector<Eigen::Quaterniond> rotations(joints.size());
   std::vector<double*> tracks;
   for (const int j : joints) tracks.push_back(out.rotation_track(j).data());
@@ -57,7 +58,7 @@ Clip clip_from_markers(const ClipEntry& entry, const Skeleton& skeleton, const M
     markers(f, values);
     for (std::size_t c = 0; c < curves; ++c) at[c] = alignment.curve(static_cast<int>(c))[static_cast<std::size_t>(f)];
     const RigidFrame frame = alignment_frame(std::span(at).first(curves), reference);
-    rig.rotations(values, rotations);
+    rig.rotations(std::span(values).first(d), rotations, std::span(values).subspan(d));
     for (std::size_t j = 1; j < joints.size(); ++j) {
       const Eigen::Quaterniond& q = rotations[j];
       double* to = tracks[j] + 4 * static_cast<std::size_t>(f);

@@ -50,7 +50,7 @@ MarkerEncoder::MarkerEncoder(std::span<const Clip> clips, const Preparation& pre
   span_ = preparation.span > 0 ? preparation.span : frames_of(0.067, rate, 5);
   root_span_ = frames_of(0.2, rate, 6);
   reference_span_ = frames_of(0.15, rate, 4);
-  fit_roots(preparation.root_cm);
+  roots_ = fit_roots(aligned_, preparation.root_cm, root_span_);
   fill_markers();
   progress_.check_stop();
   analysis_ = analyse_repeats(markers_, {.find_repeats = preparation.repeats});
@@ -68,20 +68,21 @@ MarkerEncoder::MarkerEncoder(std::span<const Clip> clips, const Preparation& pre
   progress_.check_stop();
 }
 
-void MarkerEncoder::fit_roots(double tolerance_cm) {
+std::vector<RootCode> fit_roots(const AlignedClips& clips, double tolerance_cm, int span) {
   constexpr double cm_per_radian = 20;  // how far a turn moves joints
-  roots_.resize(clips_.size());
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
-    const RootAlignment exact = root_alignment(aligned_.vectors[c], aligned_.degrees[c]);
-    RootCode& root = roots_[c];
+  std::vector<RootCode> out(clips.vectors.size());
+  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t c) {
+    const RootAlignment exact = root_alignment(clips.vectors[c], clips.degrees[c]);
+    RootCode& root = out[c];
     root.degrees = exact.degrees;
     root.frames = exact.frames;
     for (int k = 0; k < RootAlignment::curve_count(exact.degrees); ++k) {
       const double step = RootCode::step[static_cast<std::size_t>(k)];
       root.curves.push_back(
-          plain_curve(exact.curve(k), root_span_, k < 3 ? tolerance_cm : tolerance_cm / cm_per_radian, step));
+          plain_curve(exact.curve(k), span, k < 3 ? tolerance_cm : tolerance_cm / cm_per_radian, step));
     }
   });
+  return out;
 }
 
 // The markers in the alignment that the decoder has.

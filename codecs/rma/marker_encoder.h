@@ -50,7 +50,6 @@ class MarkerEncoder {
 
  private:
   struct Curves;
-  void fit_roots(double tolerance_cm);
   void fill_markers();
   void split_clips();
   [[nodiscard]] int axes_for(std::size_t group, double variance) const;
@@ -72,6 +71,9 @@ class MarkerEncoder {
   std::vector<GroupSpace> spaces_;  // with many axes
   std::vector<std::vector<ContactTrack>> contacts_;
 };
+
+// Alignments fitted to so many cm, control points at least every `span` frames.
+[[nodiscard]] std::vector<RootCode> fit_roots(const AlignedClips& clips, double tolerance_cm, int span);
 
 // The knots' values of one curve as steps: value = (q + offset) step about a minimum of its own.
 [[nodiscard]] CurveCode plain_curve(std::span<const double> curve, int span, double tolerance, double step);

@@ -25,11 +25,10 @@ enum Context : int {
   range_number = mean + 6,
   bits_number,
   axis_count_number,
-  degrees_number,
   minimum_number,
   axis_entry = minimum_number + 2 * axis_buckets,
   root_curve = axis_entry + axis_buckets,
-  axis_curve = root_curve + 7 * curve_contexts,
+  axis_curve = root_curve + root_contexts,
   context_count = axis_curve + 2 * axis_buckets * curve_contexts
 };
 
@@ -168,6 +167,21 @@ CurveCode get_curve(ValueReader& in, int frames, int span, int context, std::int
     if (std::abs(value) > largest_value) in.damaged();
     difference = i == 0 ? 0 : step;
     out.values.push_back(static_cast<std::int32_t>(value));
+  }
+  return out;
+}
+
+void put_root(ValueWriter& out, const RootCode& root, int span, int context) {
+  out.put_bit(root.degrees == 6, context);
+  for (std::size_t k = 0; k < root.curves.size(); ++k) {
+    put_curve(out, root.curves[k], root.frames, span, context + 1 + curve_contexts * static_cast<int>(k));
+  }
+}
+
+RootCode get_root(ValueReader& in, int frames, int span, int context, std::int64_t& numbers) {
+  RootCode out{.degrees = in.get_bit(context) ? 6 : 4, .frames = frames, .curves = {}};
+  for (int k = 0; k < RootAlignment::curve_count(out.degrees); ++k) {
+    out.curves.push_back(get_curve(in, frames, span, context + 1 + curve_contexts * k, numbers));
   }
   return out;
 }
@@ -340,11 +354,7 @@ Bytes pack_marker_stream(const MarkerStream& stream) {
   int last_primary = 0;
   for (const MarkerClip& clip : stream.clips) put_clip(out, stream, clip, primaries, last_primary);
   for (std::size_t c = 0; c < stream.roots.size(); ++c) {
-    const RootCode& root = stream.roots[c];
-    out.put_bit(root.degrees == 6, degrees_number);
-    for (std::size_t k = 0; k < root.curves.size(); ++k) {
-      put_curve(out, root.curves[k], root.frames, stream.root_span, root_curve + curve_contexts * static_cast<int>(k));
-    }
+    put_root(out, stream.roots[c], stream.root_span, root_curve);
     put_contacts(out, stream.contacts[c]);
   }
   return std::move(out).finish();
@@ -370,11 +380,7 @@ MarkerStream unpack_marker_stream(std::span<const std::byte> bytes, const ClipTa
   int last_primary = 0;
   for (MarkerClip& clip : out.clips) get_clip(in, out, clip, primaries, last_primary, numbers);
   for (const ClipEntry& entry : table.clips) {
-    RootCode root{.degrees = in.get_bit(degrees_number) ? 6 : 4, .frames = entry.frames, .curves = {}};
-    for (int k = 0; k < RootAlignment::curve_count(root.degrees); ++k) {
-      root.curves.push_back(get_curve(in, entry.frames, out.root_span, root_curve + curve_contexts * k, numbers));
-    }
-    out.roots.push_back(std::move(root));
+    out.roots.push_back(get_root(in, entry.frames, out.root_span, root_curve, numbers));
     const Skeleton& skeleton = table.skeletons[static_cast<std::size_t>(entry.skeleton)];
     out.contacts.push_back(get_contacts(in, entry.frames, skeleton.joint_count(), numbers));
   }

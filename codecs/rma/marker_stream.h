@@ -94,6 +94,10 @@ struct MarkerStream {
 // Shared with other streams of markers.
 void put_reference_pose(ValueWriter& out, const ReferencePose& pose, int context);
 [[nodiscard]] ReferencePose get_reference_pose(ValueReader& in, int joints, int context);
+// An alignment; takes contexts [context, context + root_contexts).
+inline constexpr int root_contexts = 1 + 7 * 10;
+void put_root(ValueWriter& out, const RootCode& root, int span, int context);
+[[nodiscard]] RootCode get_root(ValueReader& in, int frames, int span, int context, std::int64_t& numbers);
 // A curve's control points; takes contexts [context, context + curve_contexts).
 inline constexpr int curve_contexts = 10;
 void put_curve(ValueWriter& out, const CurveCode& curve, int frames, int span, int context);

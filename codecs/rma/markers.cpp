@@ -113,7 +113,7 @@ MarkerRig::MarkerRig(const Skeleton& skeleton) {
 }
 
 void MarkerRig::place(const Eigen::Vector3d& root, std::span<const Eigen::Quaterniond> rotations,
-                      std::span<double> markers) const {
+                      std::span<double> markers, std::span<double> own) const {
   thread_local std::vector<Eigen::Matrix3d> turn;
   thread_local std::vector<Eigen::Vector3d> at;
   turn.resize(bones_.size());
@@ -122,19 +122,21 @@ void MarkerRig::place(const Eigen::Vector3d& root, std::span<const Eigen::Quater
   for (std::size_t b = 0; b < bones_.size(); ++b) {
     const Bone& bone = bones_[b];
     const auto parent = static_cast<std::size_t>(bone.parent);
-    const Eigen::Matrix3d own = rotations[b].toRotationMatrix();
-    turn[b] = bone.parent < 0 ? own : Eigen::Matrix3d(turn[parent] * own);
+    const Eigen::Matrix3d local = rotations[b].toRotationMatrix();
+    turn[b] = bone.parent < 0 ? local : Eigen::Matrix3d(turn[parent] * local);
     at[b] = bone.parent < 0 ? root : Eigen::Vector3d(at[parent] + turn[parent] * bone.offset);
     const Eigen::Vector3d along = at[b] + turn[b] * bone.along;
     const Eigen::Vector3d across = at[b] + turn[b] * bone.across;
     for (std::size_t k = 0; k < 3; ++k) {
       markers[3 + 6 * b + k] = along[static_cast<Eigen::Index>(k)];
       markers[6 + 6 * b + k] = across[static_cast<Eigen::Index>(k)];
+      if (!own.empty()) own[3 * b + k] = at[b][static_cast<Eigen::Index>(k)];
     }
   }
 }
 
-void MarkerRig::rotations(std::span<const double> markers, std::span<Eigen::Quaterniond> rotations) const {
+void MarkerRig::rotations(std::span<const double> markers, std::span<Eigen::Quaterniond> rotations,
+                          std::span<const double> own) const {
   thread_local std::vector<Eigen::Matrix3d> turn;
   thread_local std::vector<Eigen::Vector3d> at;
   turn.resize(bones_.size());
@@ -146,8 +148,8 @@ void MarkerRig::rotations(std::span<const double> markers, std::span<Eigen::Quat
     at[b] = bone.parent < 0 ? root : Eigen::Vector3d(at[parent] + turn[parent] * bone.offset);
     const double* m = markers.data() + 3 + 6 * b;
     Eigen::Matrix3d axes;
-    const bool told =
-        axes_of(Eigen::Vector3d(m[0], m[1], m[2]) - at[b], Eigen::Vector3d(m[3], m[4], m[5]) - at[b], axes);
+    const Eigen::Vector3d from = own.empty() ? at[b] : Eigen::Vector3d(own[3 * b], own[3 * b + 1], own[3 * b + 2]);
+    const bool told = axes_of(Eigen::Vector3d(m[0], m[1], m[2]) - from, Eigen::Vector3d(m[3], m[4], m[5]) - from, axes);
     if (told) {
       turn[b] = axes * bone.back;
     } else {
@@ -183,7 +185,8 @@ AlignedClips align_clips(std::span<const Clip> clips) {
   return out;
 }
 
-void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignment& alignment, double* out) {
+void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignment& alignment, double* out,
+                  bool with_joints) {
   const PoseVectors& vectors = clips.vectors[clip];
   const MarkerRig& rig = clips.rigs[static_cast<std::size_t>(clips.rig[clip])];
   const auto frames = static_cast<std::size_t>(vectors.frames);
@@ -206,8 +209,9 @@ void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignme
     rotations[0] = frame.turn.conjugate() * (alignment_frame(heading, clips.reference).turn * rotations[0]);
     const Eigen::Vector3d root =
         frame.turn.conjugate() * (Eigen::Vector3d(v[0], v[frames], v[2 * frames]) - frame.position);
-    rig.place(root, rotations,
-              {out + f * static_cast<std::size_t>(rig.dimensions()), static_cast<std::size_t>(rig.dimensions())});
+    const auto d = static_cast<std::size_t>(rig.dimensions());
+    const std::size_t stride = d + (with_joints ? 3 * joints : 0);
+    rig.place(root, rotations, {out + f * stride, d}, {out + f * stride + d, stride - d});
   }
 }
 

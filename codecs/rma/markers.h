@@ -43,13 +43,14 @@ class MarkerRig {
   [[nodiscard]] int dimensions() const { return 3 + 6 * joint_count(); }
 
   // Markers of a posture: where the root is, its rotation and the local rotations of the other rotating joints
-  // (Skeleton::rotating_joints()), in the frame of alignment.
-  void place(const Eigen::Vector3d& root, std::span<const Eigen::Quaterniond> rotations,
-             std::span<double> markers) const;
+  // (Skeleton::rotating_joints()), in the frame of alignment. `own`: where the joints are, [joint][x y z], if wanted.
+  void place(const Eigen::Vector3d& root, std::span<const Eigen::Quaterniond> rotations, std::span<double> markers,
+             std::span<double> own = {}) const;
 
   // The rotations that markers show, likewise. Same bits on every machine; markers that show none (all in one point)
-  // leave the joint at rest.
-  void rotations(std::span<const double> markers, std::span<Eigen::Quaterniond> rotations) const;
+  // leave the joint at rest. `own`, if given: where the markers have the joints; they then tell directions from there.
+  void rotations(std::span<const double> markers, std::span<Eigen::Quaterniond> rotations,
+                 std::span<const double> own = {}) const;
 
  private:
   struct Bone {
@@ -76,7 +77,9 @@ struct AlignedClips {
 [[nodiscard]] AlignedClips align_clips(std::span<const Clip> clips);
 
 // The markers of one clip, [frame][dimension], in the frames that an alignment gives (that of the decoder, say).
-void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignment& alignment, double* out);
+// `with_joints`: behind them, in each frame, where the rotating joints are.
+void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignment& alignment, double* out,
+                  bool with_joints = false);
 
 // The markers of all clips, one after the other, aligned exactly.
 [[nodiscard]] FrameTable marker_table(const AlignedClips& clips);
