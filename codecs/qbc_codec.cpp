@@ -74,18 +74,17 @@ class QbcEncoder {
   };
 
   [[nodiscard]] Result encode(const Plan& plan, const Progress& progress) const {
-    const QbcTables tables{.interval = plan.interval,
-                           .grid_log = 1,
-                           .step_index = step_index_of(plan),
-                           .root_unit = static_cast<float>(plan.root_unit)};
+    const QbcTables tables{
+        .interval = plan.interval, .step_index = step_index_of(plan), .root_unit = static_cast<float>(plan.root_unit)};
     std::vector<QbcCurve> coded(curves_.size());
     std::atomic<std::size_t> done = 0;
     std::atomic<bool> kept = true;
     tbb::parallel_for(std::size_t{0}, curves_.size(), [&](std::size_t i) {
       const CurveChoice choice = choose_curve(task(curves_[i].first, curves_[i].second, plan, tables), plan.paper);
       if (choice.error.largest > plan.limit) kept = false;
-      coded[i] = {
-          .finer = choice.task.step_index - tables.step_index, .fine = choice.task.grid == 1, .code = choice.code};
+      coded[i] = {.finer = choice.task.step_index - tables.step_index,
+                  .grid_log = bit_length(static_cast<std::uint64_t>(choice.task.grid)) - 1,
+                  .code = choice.code};
       static_cast<void>(done.fetch_add(1));
     });
     static_cast<void>(progress);
@@ -113,7 +112,7 @@ class QbcEncoder {
                   .dimensions = curve_dimensions(layout_, joint),
                   .limit = plan.limit,
                   .interval = plan.interval,
-                  .grid = 1 << tables.grid_log,
+                  .grid = 2,
                   .step_index = tables.step_index,
                   .rate_weight = plan.rate_weight * plan.limit};
     const auto n = static_cast<std::size_t>(out.dimensions);

@@ -4,16 +4,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "codecs/qbc/banded_system.h"
+
 namespace kinespace {
 namespace {
 
 class NumberChoice {
  public:
   NumberChoice(const CurveTask& task, const std::vector<int>& breaks)
-      : task_(task), shape_(shape_of(task)), n_(static_cast<std::size_t>(task.dimensions)), predictor_(shape_) {
+      : task_(task),
+        shape_(shape_of(task)),
+        n_(static_cast<std::size_t>(task.dimensions)),
+        predictor_(shape_),
+        context_(task.dimensions) {
     out_.breaks = breaks;
     for (std::size_t s = 0; s + 1 < breaks.size(); ++s) sums_.push_back(segment_sums(task, breaks[s], breaks[s + 1]));
-    for (std::size_t b = 0; b < breaks.size(); ++b) add_to_system(b);
   }
 
   CurveNumbers choose() {
@@ -32,43 +37,19 @@ class NumberChoice {
  private:
   [[nodiscard]] int length(std::size_t s) const { return out_.breaks[s + 1] - out_.breaks[s]; }
 
-  // Row b of the system in the ends, all middles at their best.
-  void add_to_system(std::size_t b) {
-    diagonal_.push_back(0);
-    off_.push_back(0);
-    right_.emplace_back();
-    if (b == 0) {
-      diagonal_[0] = 1;
-      std::copy_n(task_.at(0), n_, right_[0].begin());
+  // The system of segments [first, last).
+  [[nodiscard]] BandedSystem system_of(std::size_t first, std::size_t last) {
+    rows_.assign(row_count(last - first), {});
+    BandedSystem out(rows_, n_);
+    for (std::size_t s = first; s < last; ++s) {
+      out.add_segment(s - first, length(s), sums_[s]);
+      if (s > first) out.add_smoothness(s - first, ratio_at(s), weight_at(s));
     }
-    const auto add = [&](std::size_t s, bool as_first) {
-      const BernsteinGram& g = bernstein_gram(length(s));
-      const ReducedGram& r = reduced_gram(length(s));
-      const double k = length(s) > 1 ? (as_first ? g.g01 : g.g12) / g.g11 : 0;
-      diagonal_[b] += as_first ? r.g00 : r.g22;
-      if (as_first) off_[b] = r.g02;
-      for (std::size_t d = 0; d < n_; ++d) {
-        right_[b][d] += (as_first ? sums_[s].r0[d] : sums_[s].r2[d]) - k * sums_[s].r1[d];
-      }
-    };
-    if (b > 0) add(b - 1, false);
-    if (b + 1 < out_.breaks.size()) add(b, true);
+    return out;
   }
-
-  // What is left of the system for ends [first, last] when the later ones, down from last, are at their best.
-  void eliminate(std::size_t first, std::size_t last) {
-    weight_.assign(last + 1 - first, 0);
-    rest_.assign(last + 1 - first, {});
-    for (std::size_t b = last + 1; b-- > first;) {
-      const std::size_t i = b - first;
-      weight_[i] = diagonal_[b];
-      rest_[i] = right_[b];
-      if (b == last) continue;
-      const double factor = off_[b] / weight_[i + 1];
-      weight_[i] -= factor * off_[b];
-      for (std::size_t d = 0; d < n_; ++d) rest_[i][d] -= factor * rest_[i + 1][d];
-    }
-  }
+  // Of the kink between a segment and the one before.
+  [[nodiscard]] double ratio_at(std::size_t s) const { return smoothness_ratio(length(s - 1), length(s)); }
+  [[nodiscard]] double weight_at(std::size_t s) const { return smoothness_weight(task_, length(s - 1), length(s)); }
 
   // The number that costs least for a value that is to be near `target`.
   std::int64_t best_number(PointKind kind, std::size_t d, double expected, double step, double target, double weight) {
@@ -91,22 +72,24 @@ class NumberChoice {
   }
 
   void choose_common() {
-    eliminate(0, out_.breaks.size() - 1);
-    std::vector<Point> free(out_.breaks.size());
-    for (std::size_t b = 0; b < free.size(); ++b) {
-      for (std::size_t d = 0; d < n_; ++d) {
-        free[b][d] = (rest_[b][d] - (b > 0 ? off_[b - 1] * free[b - 1][d] : 0)) / weight_[b];
-      }
+    const std::size_t segments = out_.breaks.size() - 1;
+    BandedSystem system = system_of(0, segments);
+    system.add_end(0, task_.at(0), 1);
+    system.eliminate();
+    free_.assign(rows_.size(), {});
+    for (std::size_t i = 0; i < free_.size(); ++i) {
+      for (std::size_t d = 0; d < n_; ++d) free_[i][d] = system.best(i, d, free_);
     }
     const double step = end_step(shape_.step(), 16, 16);
     common_.assign(static_cast<std::size_t>(shape_.interval_count()) + 1, {});
     std::size_t b = 0;
     for (std::size_t i = 0; i < common_.size(); ++i) {
       while (out_.breaks[b] != shape_.common_break(static_cast<int>(i))) ++b;
-      context_.begin_point();
+      context_.begin_point(1);
+      const std::size_t row = end_row(b);
       for (std::size_t d = 0; d < n_; ++d) {
         const double before = i > 0 ? common_[i - 1][d] : 0;
-        const std::int64_t number = best_number(PointKind::common, d, before, step, free[b][d], weight_[b]);
+        const std::int64_t number = best_number(PointKind::common, d, before, step, free_[row][d], system.weight(row));
         common_[i][d] = before + static_cast<double>(number) * step;
         out_.common.push_back(number);
       }
@@ -116,48 +99,48 @@ class NumberChoice {
   // Segments [first, last), whose outer ends are fixed.
   void choose_interval(std::size_t first, std::size_t last, std::size_t interval) {
     const Point& goal = common_[interval + 1];
-    if (last > first + 1) {
-      for (std::size_t d = 0; d < n_; ++d) right_[last - 1][d] -= off_[last - 1] * goal[d];
-      eliminate(first + 1, last - 1);
+    BandedSystem system = system_of(first, last);
+    const std::size_t m = last - first;
+    if (first > 0) system.add_smoothness_after(0, ratio_at(first), weight_at(first), middle_.data());
+    if (last + 1 < out_.breaks.size()) {
+      system.add_smoothness_before(m, ratio_at(last), weight_at(last), free_[middle_row(last)].data());
     }
-    Point start = common_[interval];
-    for (std::size_t s = first; s < last; ++s) {
-      const bool at_goal = s + 1 == last;
-      predictor_.begin(start.data());
-      Point end = goal;
-      context_.begin_point();
-      if (!at_goal) {
-        const double step = end_step(shape_.step(), length(s), length(s + 1));
-        const int rest = out_.breaks[last] - out_.breaks[s];
+    system.fix(end_row(0), common_[interval].data());
+    system.fix(end_row(m), goal.data());
+    system.eliminate();
+    std::vector<Point> known(row_count(m));
+    known[0] = common_[interval];
+    for (std::size_t s = 0; s < m; ++s) {
+      const int frames = length(first + s);
+      predictor_.begin(known[end_row(s)].data());
+      Point& end = known[end_row(s + 1)];
+      end = goal;
+      context_.begin_point(frames);
+      if (s + 1 < m) {
+        const double step = end_step(shape_.step(), frames, length(first + s + 1));
+        const int rest = out_.breaks[last] - out_.breaks[first + s];
         for (std::size_t d = 0; d < n_; ++d) {
-          const std::size_t row = s - first;
-          const double target = (rest_[row][d] - off_[s] * start[d]) / weight_[row];
-          const double expected = predictor_.end(d, length(s), rest, goal[d]);
-          const std::int64_t number = best_number(PointKind::end, d, expected, step, target, weight_[row]);
-          end[d] = expected + static_cast<double>(number) * step;
-          out_.points.push_back(number);
+          choose_number(PointKind::end, d, predictor_.end(d, frames, rest, goal[d]), step, system, end_row(s + 1),
+                        known);
         }
       }
-      const Point middle = choose_middle(s, start, end);
-      predictor_.advance(length(s), middle.data(), end.data());
-      start = end;
+      context_.begin_point(frames);
+      const double step = middle_step(shape_.step(), frames);
+      for (std::size_t d = 0; d < n_; ++d) {
+        const double expected = predictor_.middle(d, frames, end[d]);
+        known[middle_row(s)][d] = expected;
+        if (frames > 1) choose_number(PointKind::middle, d, expected, step, system, middle_row(s), known);
+      }
+      middle_ = known[middle_row(s)];
+      predictor_.advance(frames, middle_.data(), end.data());
     }
   }
 
-  Point choose_middle(std::size_t s, const Point& start, const Point& end) {
-    Point out{};
-    context_.begin_point();
-    const double step = middle_step(shape_.step(), length(s));
-    const BernsteinGram& g = bernstein_gram(length(s));
-    for (std::size_t d = 0; d < n_; ++d) {
-      out[d] = predictor_.middle(d, length(s), end[d]);
-      if (length(s) < 2) continue;
-      const double target = (sums_[s].r1[d] - g.g01 * start[d] - g.g12 * end[d]) / g.g11;
-      const std::int64_t number = best_number(PointKind::middle, d, out[d], step, target, g.g11);
-      out[d] += static_cast<double>(number) * step;
-      out_.points.push_back(number);
-    }
-    return out;
+  void choose_number(PointKind kind, std::size_t d, double expected, double step, const BandedSystem& system,
+                     std::size_t row, std::vector<Point>& known) {
+    const std::int64_t number = best_number(kind, d, expected, step, system.best(row, d, known), system.weight(row));
+    known[row][d] = expected + static_cast<double>(number) * step;
+    out_.points.push_back(number);
   }
 
   const CurveTask& task_;
@@ -167,11 +150,23 @@ class NumberChoice {
   SizeContext context_;
   CurveNumbers out_;
   std::vector<SegmentSums> sums_;
-  std::vector<double> diagonal_, off_, weight_;
-  std::vector<Point> right_, rest_, common_;
+  std::vector<BandedRow> rows_;
+  std::vector<Point> free_, common_;
+  Point middle_{};  // of the segment before
 };
 
 }  // namespace
+
+double smoothness_ratio(int length_before, int length_after) {
+  return static_cast<double>(length_after) / length_before;
+}
+
+double smoothness_weight(const CurveTask& task, int length_before, int length_after) {
+  if (length_before < 2 || length_after < 2) return 0;
+  const double ratio = smoothness_ratio(length_before, length_after);
+  const double step = middle_step(quarter_step(task.step_index), length_after);
+  return task.smoothness * task.rate_weight / (step * step * (1 + ratio * ratio));
+}
 
 CurveNumbers choose_numbers(const CurveTask& task, const std::vector<int>& breaks) {
   return NumberChoice(task, breaks).choose();
@@ -223,15 +218,22 @@ CurveError curve_error(const CurveTask& task, const CodedCurve& curve) {
   return out;
 }
 
-CurveChoice choose_curve(CurveTask task, bool paper) {
+namespace {
+
+CurveChoice code_with(const CurveTask& task, const std::vector<int>& breaks) {
+  const CurveShape shape = shape_of(task);
+  CurveChoice out{.task = task, .code = encode_curve(shape, choose_numbers(task, breaks))};
+  out.error = curve_error(task, decode_curve(shape, out.code, "the curve"));
+  return out;
+}
+
+CurveChoice within_limit(CurveTask task, bool paper) {
   const double limit = task.limit;
   std::vector<int> breaks;
   for (int round = 0;; ++round) {
     // Every other time the numbers alone are chosen anew, more carefully.
     if (round % 2 == 0) breaks = paper ? break_and_fit(task) : choose_breaks(task);
-    const CurveShape shape = shape_of(task);
-    CurveChoice out{.task = task, .code = encode_curve(shape, choose_numbers(task, breaks))};
-    out.error = curve_error(task, decode_curve(shape, out.code, "the curve"));
+    CurveChoice out = code_with(task, breaks);
     constexpr int most_rounds = 60;
     if (out.error.largest <= limit || round == most_rounds) return out;
     ++task.step_index;
@@ -239,6 +241,37 @@ CurveChoice choose_curve(CurveTask task, bool paper) {
     if (round % 2 == 1) task.limit *= 0.93;
     if (round >= 6) task.grid = 1;
   }
+}
+
+}  // namespace
+
+CurveChoice choose_curve(const CurveTask& task, bool paper) {
+  CurveChoice best = within_limit(task, paper);
+  constexpr int longest = 16384;  // longer ones take the first choice
+  if (paper || task.frames > longest) return best;
+  const auto cost = [&](const CurveChoice& choice) {
+    return choice.error.sum + task.rate_weight * 8 * static_cast<double>(choice.code.size());
+  };
+  const auto consider = [&](CurveTask other) {
+    if (other.step_index == best.task.step_index && other.grid == best.task.grid) return false;
+    CurveChoice choice = code_with(other, choose_breaks(other));
+    if (choice.error.largest > task.limit || cost(choice) >= cost(best)) return false;
+    best = std::move(choice);
+    return true;
+  };
+  CurveTask regridded = task;
+  for (regridded.grid = 2 * task.grid; regridded.grid <= 8 * task.grid; regridded.grid *= 2) {
+    if (!consider(regridded)) break;
+  }
+  regridded.grid = task.grid / 2;
+  if (best.task.grid == task.grid && task.grid > 1) consider(regridded);
+  for (const int steps : {2, -2}) {
+    CurveTask other = task;
+    other.grid = best.task.grid;
+    other.step_index = best.task.step_index + steps;
+    if (consider(other)) break;
+  }
+  return best;
 }
 
 }  // namespace kinespace

@@ -17,6 +17,11 @@ namespace kinespace {
 
 [[nodiscard]] CurveShape shape_of(const CurveTask& task);
 
+// A kink costs bits, so the fit shuns those that hardly lower the error: smoothness_weight * kink^2 is added to the
+// squared error, where the kink is how far a middle is from going on smoothly over lengths of that ratio.
+[[nodiscard]] double smoothness_ratio(int length_before, int length_after);
+[[nodiscard]] double smoothness_weight(const CurveTask& task, int length_before, int length_after);
+
 // Ascending, with all common breaks.
 [[nodiscard]] std::vector<int> choose_breaks(const CurveTask& task);
 // The paper's: break-and-fit (codecs/quadratic_bezier.h).
@@ -40,7 +45,7 @@ struct CurveChoice {
   Bytes code;
   CurveError error;
 };
-// Finer steps and more breaks until every frame keeps to the limit.
-[[nodiscard]] CurveChoice choose_curve(CurveTask task, bool paper);
+// Finer steps and more breaks until every frame keeps to the limit; then other grids and steps where those cost less.
+[[nodiscard]] CurveChoice choose_curve(const CurveTask& task, bool paper);
 
 }  // namespace kinespace

@@ -50,7 +50,7 @@ template <typename Coder>
 class CurveCoder {
  public:
   CurveCoder(Coder& coder, const CurveShape& shape, const std::string& source)
-      : coder_(coder), shape_(shape), source_(source) {}
+      : coder_(coder), shape_(shape), source_(source), context_(shape.dimensions) {}
 
   void number(PointKind kind, std::size_t d, std::int64_t& value) {
     const auto k = static_cast<std::size_t>(kind);
@@ -68,7 +68,7 @@ class CurveCoder {
     }
     context_.see(kind, d, value);
   }
-  void begin_point() { context_.begin_point(); }
+  void begin_point(int length) { context_.begin_point(length); }
 
   // Lengths of the segments of an interval of `rest` frames, whole grid steps but for the last.
   void lengths(int rest, std::vector<int>& out) {
@@ -158,7 +158,7 @@ class CurveDecoder {
     std::vector<double> out;
     const double step = end_step(shape_.step(), 16, 16);
     for (int i = 0; i <= shape_.interval_count(); ++i) {
-      code_.begin_point();
+      code_.begin_point(1);
       for (std::size_t d = 0; d < n_; ++d) {
         std::int64_t number = 0;
         code_.number(PointKind::common, d, number);
@@ -197,7 +197,7 @@ class CurveDecoder {
     Point start{}, middle{}, end{};
     std::copy(out.ends.end() - static_cast<std::ptrdiff_t>(n_), out.ends.end(), start.begin());
     predictor.begin(start.data());
-    code_.begin_point();
+    code_.begin_point(length);
     const double coarse = next > 0 ? end_step(shape_.step(), length, next) : 0;
     for (std::size_t d = 0; d < n_; ++d) {
       if (next == 0) {
@@ -208,7 +208,7 @@ class CurveDecoder {
       code_.number(PointKind::end, d, number);
       end[d] = checked(predictor.end(d, length, rest, goal[d]) + static_cast<double>(number) * coarse);
     }
-    code_.begin_point();
+    code_.begin_point(length);
     const double fine = middle_step(shape_.step(), length);
     for (std::size_t d = 0; d < n_; ++d) {
       std::int64_t number = 0;
@@ -285,18 +285,24 @@ CurveModels::CurveModels() {
 }
 
 int SizeContext::next(PointKind kind, std::size_t d) const {
-  const std::int64_t before = last_[static_cast<std::size_t>(kind)][d];
-  const std::int64_t beside = known_ > 0 ? 2 * sum_ / known_ : before;
-  const std::int64_t size = (before + beside + 1) / 2;  // about twice the magnitude expected
-  return size == 0 ? 0 : size <= 1 ? 1 : size <= 3 ? 2 : size <= 6 ? 3 : size <= 14 ? 4 : 5;
+  const auto k = static_cast<std::size_t>(kind);
+  const std::int64_t before = (last_[k][d] * length_ + last_length_[k] / 2) / last_length_[k];
+  const std::int64_t beside = known_ > 0 ? 4 * sum_ / known_ : before;
+  const std::int64_t size = (before + beside + 1) / 2;  // about four times the magnitude expected
+  constexpr std::array<std::int64_t, CurveModels::sizes - 1> bounds{1, 3, 6, 12, 26, 56, 120};
+  return static_cast<int>(std::ranges::upper_bound(bounds, size) - bounds.begin());
 }
 
 void SizeContext::see(PointKind kind, std::size_t d, std::int64_t value) {
+  const auto k = static_cast<std::size_t>(kind);
   const std::int64_t magnitude = std::min(std::abs(value), largest_number);
-  std::int64_t& last = last_[static_cast<std::size_t>(kind)][d];
-  last = (last + 2 * magnitude + 1) / 2;
+  const std::int64_t before = (last_[k][d] * length_ + last_length_[k] / 2) / last_length_[k];
+  fresh_[d] = (before + 4 * magnitude + 1) / 2;
   sum_ += magnitude;
   ++known_;
+  if (known_ < dimensions_) return;
+  last_[k] = fresh_;
+  last_length_[k] = length_;
 }
 
 double number_bits(PointKind kind, int size, std::int64_t value) {
@@ -320,13 +326,13 @@ Bytes encode_curve(const CurveShape& shape, const CurveNumbers& numbers) {
   CurveCoder<RangeEncoder> code(coder, shape, none);
   const auto n = static_cast<std::size_t>(shape.dimensions);
   for (std::size_t i = 0; i < numbers.common.size(); ++i) {
-    if (i % n == 0) code.begin_point();
+    if (i % n == 0) code.begin_point(1);
     std::int64_t number = numbers.common[i];
     code.number(PointKind::common, i % n, number);
   }
   std::size_t at = 0, segment = 0;
-  const auto put_point = [&](PointKind kind) {
-    code.begin_point();
+  const auto put_point = [&](PointKind kind, int length) {
+    code.begin_point(length);
     for (std::size_t d = 0; d < n; ++d) {
       std::int64_t number = numbers.points[at++];
       code.number(kind, d, number);
@@ -340,8 +346,8 @@ Bytes encode_curve(const CurveShape& shape, const CurveNumbers& numbers) {
     }
     code.lengths(last - shape.common_break(i), lengths);
     for (std::size_t s = 0; s < lengths.size(); ++s) {
-      if (s + 1 < lengths.size()) put_point(PointKind::end);
-      if (lengths[s] > 1) put_point(PointKind::middle);
+      if (s + 1 < lengths.size()) put_point(PointKind::end, lengths[s]);
+      if (lengths[s] > 1) put_point(PointKind::middle, lengths[s]);
     }
     segment += lengths.size();
   }

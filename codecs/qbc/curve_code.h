@@ -70,7 +70,7 @@ class CurvePredictor {
 class CurveModels {
  public:
   static constexpr int kinds = 3;  // common breaks, ends, middles
-  static constexpr int sizes = 6;
+  static constexpr int sizes = 8;
   static constexpr int exponents = 28;
   CurveModels();
 
@@ -86,14 +86,20 @@ enum class PointKind : int { common, end, middle };
 // the mean of those of the same point that are known.
 class SizeContext {
  public:
+  explicit SizeContext(int dimensions) : dimensions_(dimensions) {}
   [[nodiscard]] int next(PointKind kind, std::size_t d) const;
-  void begin_point() { sum_ = 0, known_ = 0; }
+  // `length`: of the point's segment, 1 for a common break.
+  void begin_point(int length) { sum_ = 0, known_ = 0, length_ = length; }
   void see(PointKind kind, std::size_t d, std::int64_t value);
 
  private:
   std::array<std::array<std::int64_t, most_dimensions>, CurveModels::kinds> last_{};
+  std::array<int, CurveModels::kinds> last_length_{1, 1, 1};
   std::int64_t sum_ = 0;
   int known_ = 0;
+  int length_ = 1;
+  int dimensions_;
+  std::array<std::int64_t, most_dimensions> fresh_{};
 };
 
 // About how many bits a number takes.

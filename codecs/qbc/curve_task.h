@@ -17,8 +17,9 @@ struct CurveTask {
   double limit = 18;           // largest squared distance of any frame
   int interval = 160;          // frames between the breaks that all joints have
   int grid = 1;                // breaks stand on multiples of so many frames of an interval
-  int step_index = 0;      // the quantiser step of a control point that counts for some 16 frames is quarter_step of it
-  double rate_weight = 1;  // squared error that a bit is worth
+  int step_index = 0;  // the quantiser step of a control point that counts for some 16 frames is quarter_step of it
+  double smoothness = 0.2;  // bits that a kink of one step counts when control points are fitted
+  double rate_weight = 1;   // squared error that a bit is worth
 
   [[nodiscard]] const double* at(int frame) const {
     return values.data() + static_cast<std::size_t>(frame) * static_cast<std::size_t>(dimensions);

@@ -61,7 +61,7 @@ class QbcReader final : public StreamReader {
   }
 
   [[nodiscard]] std::vector<int> preview_frames(std::size_t clip) const override {
-    const CurveShape shape = curves_.tables.shape(table_.clips[clip].frames, 1, 0, true);
+    const CurveShape shape = curves_.tables.shape(table_.clips[clip].frames, 1, 0, 0);
     std::vector<int> out;
     for (int i = 0; i <= shape.interval_count(); ++i) out.push_back(shape.common_break(i));
     return out;
@@ -95,7 +95,7 @@ class QbcReader final : public StreamReader {
   [[nodiscard]] CurveShape shape(std::size_t clip, std::size_t joint) const {
     const QbcCurveView& curve = view(clip, joint);
     return curves_.tables.shape(table_.clips[clip].frames, curve_dimensions(curves_.layout, joint), curve.finer,
-                                curve.fine);
+                                curve.grid_log);
   }
 
   void check_range(std::size_t clip, int first, int count) const {

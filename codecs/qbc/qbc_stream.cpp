@@ -10,8 +10,9 @@ namespace kinespace {
 namespace {
 
 // Contexts of integer_model.h.
-enum Kind : int { interval_number, grid_number, step_number, finer_number, fine_flag, size_number };
+enum Kind : int { interval_number, unit_flag, step_number, finer_number, grid_number, size_number };
 
+constexpr int coarsest_grid_log = 5;
 constexpr std::int64_t largest_curve = std::int64_t{1} << 34;
 
 void put_float(IntegerWriter& out, float value) {
@@ -28,14 +29,13 @@ float get_float(IntegerReader& in) {
 Bytes pack_table(const QbcTables& tables, std::span<const QbcCurve> curves) {
   IntegerWriter out;
   out.put(tables.interval, interval_number);
-  out.put(tables.grid_log, grid_number);
   out.put(tables.step_index, step_number);
   const bool usual = tables.root_unit == QbcTables{}.root_unit;
-  out.put(usual ? 0 : 1, fine_flag);
+  out.put(usual ? 0 : 1, unit_flag);
   if (!usual) put_float(out, tables.root_unit);
   for (const QbcCurve& curve : curves) {
     out.put(curve.finer, finer_number);
-    out.put(curve.fine ? 1 : 0, fine_flag);
+    out.put(curve.grid_log - 1, grid_number);
     out.put(static_cast<std::int64_t>(curve.code.size()), size_number);
   }
   return std::move(out).finish();
@@ -44,9 +44,8 @@ Bytes pack_table(const QbcTables& tables, std::span<const QbcCurve> curves) {
 QbcTables get_tables(IntegerReader& in) {
   QbcTables out;
   out.interval = static_cast<int>(in.get_between(1, longest_segment, interval_number));
-  out.grid_log = static_cast<int>(in.get_between(0, 3, grid_number));
   out.step_index = static_cast<int>(in.get_between(-QbcTables::finest, QbcTables::finest, step_number));
-  if (in.get_between(0, 1, fine_flag) == 1) out.root_unit = get_float(in);
+  if (in.get_between(0, 1, unit_flag) == 1) out.root_unit = get_float(in);
   if (!(out.root_unit >= 1e-4F && out.root_unit <= 1e4F)) in.damaged();
   return out;
 }
@@ -79,8 +78,8 @@ QbcCurves unpack_curves(std::span<const std::byte> bytes, const ClipTable& clips
       QbcCurveView curve;
       std::size_t size = 0;
       if (curve_dimensions(out.layout, j) > 0) {
-        curve.finer = static_cast<int>(numbers.get_between(0, QbcTables::finest, finer_number));
-        curve.fine = numbers.get_between(0, 1, fine_flag) == 1;
+        curve.finer = static_cast<int>(numbers.get_between(-QbcTables::finest, QbcTables::finest, finer_number));
+        curve.grid_log = 1 + static_cast<int>(numbers.get_between(-1, coarsest_grid_log - 1, grid_number));
         size = static_cast<std::size_t>(numbers.get_between(0, largest_curve, size_number));
       }
       out.curves.push_back(curve);

@@ -4,8 +4,8 @@
 //   curves   length and bytes of the joints' channels (codecs/joint_channels.h); length and bytes of the table of
 //            curves; the curves, clip by clip and joint by joint. Joints that never turn have none
 //
-// The table: the interval of the common breaks, log2 of the grid, the quantiser step, the root's unit; of each curve
-// how much finer its step is, whether its grid is single frames, and how many bytes it has. Private to this folder.
+// The table: the interval of the common breaks, the quantiser step, the root's unit; of each curve how much finer its
+// step is, log2 of the grid that its breaks stand on, and how many bytes it has. Private to this folder.
 #pragma once
 
 #include <string>
@@ -18,23 +18,22 @@
 namespace kinespace {
 
 struct QbcCurve {
-  int finer = 0;      // quarters of an octave
-  bool fine = false;  // breaks at any frame
-  Bytes code;         // encoder
+  int finer = 0;     // quarters of an octave
+  int grid_log = 1;  // breaks stand on multiples of 2^so many frames
+  Bytes code;        // encoder
 };
 
 struct QbcTables {
   static constexpr int finest = 400;
   int interval = 160;
-  int grid_log = 1;
   int step_index = 0;
   float root_unit = 5.6444F;  // cm
 
-  [[nodiscard]] CurveShape shape(int frames, int dimensions, int finer, bool fine) const {
+  [[nodiscard]] CurveShape shape(int frames, int dimensions, int finer, int grid_log) const {
     return {.frames = frames,
             .dimensions = dimensions,
             .interval = interval,
-            .grid = fine ? 1 : 1 << grid_log,
+            .grid = 1 << grid_log,
             .step_index = step_index + finer};
   }
 };
@@ -49,7 +48,7 @@ struct QbcTables {
 
 struct QbcCurveView {
   int finer = 0;
-  bool fine = false;
+  int grid_log = 1;
   std::span<const std::byte> code;
 };
 struct QbcCurves {

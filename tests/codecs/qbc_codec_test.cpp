@@ -146,8 +146,9 @@ TEST(Qbc, parts_of_a_clip_equal_the_whole) {
 }
 
 TEST(Qbc, targets_are_met_and_stated) {
-  const std::span<const Clip> clips = std::span(test::sample_clips()).first(3);
-  for (const double target : {0.2, 2.0}) {
+  const std::vector<Clip> short_clips{slice(test::sample_clips()[0], 0, 60), slice(test::sample_clips()[4], 10, 50)};
+  const std::span<const Clip> clips = short_clips;
+  for (const double target : {0.4, 2.0}) {
     const Bytes stream = encode("qbc", clips, {.target = {.mean_error_cm = target}});
     const double mean = test::error_of({clips.begin(), clips.end()}, open(stream)->decode_all()).mean_cm();
     EXPECT_LE(mean, target);
@@ -156,11 +157,12 @@ TEST(Qbc, targets_are_met_and_stated) {
   }
   const Bytes stream = encode("qbc", clips, {.target = {.max_error_cm = 3}});
   EXPECT_LE(test::error_of({clips.begin(), clips.end()}, open(stream)->decode_all()).largest, 3);
-  EXPECT_LE(encode("qbc", clips, {.target = {.bytes = 4000}}).size(), 4000U);
+  EXPECT_LE(encode("qbc", clips, {.target = {.bytes = 2400}}).size(), 2400U);
 }
 
 TEST(Qbc, targets_that_cannot_be_met_are_usage_errors) {
-  const std::span<const Clip> clips = std::span(test::sample_clips()).first(1);
+  const Clip clip = slice(test::sample_clips()[0], 0, 30);
+  const std::span<const Clip> clips(&clip, 1);
   for (const CodecTarget& target : {CodecTarget{.bytes = 60}, CodecTarget{.max_error_cm = 1e-12}}) {
     try {
       static_cast<void>(encode("qbc", clips, {.target = target}));
