@@ -26,6 +26,8 @@ struct DecodeOptions {
   fs::path stream;
   fs::path output;
   std::optional<std::string> clip;
+  std::optional<std::string> joint;
+  bool preview = false;
   std::optional<double> from_s;
   std::optional<double> to_s;
   std::optional<fs::path> basis;  // a library
@@ -48,19 +50,32 @@ std::pair<int, int> frame_range(const ClipSummary& clip, const DecodeOptions& op
   return {first, static_cast<int>(std::min(to, last)) - first + 1};
 }
 
+Clip decode_joint(const StreamReader& reader, std::size_t clip, const DecodeOptions& options, int first, int count) {
+  const int joint = reader.skeleton(clip).find(*options.joint);
+  if (joint >= 0) return reader.decode_joint(clip, joint, first, count);
+  throw Error(ErrorKind::usage, {.file = options.stream.string(),
+                                 .found = fmt::format("no joint named {}", *options.joint),
+                                 .expected = "one of the clip's skeleton"});
+}
+
 std::vector<Clip> decode_clips(const StreamReader& reader, const DecodeOptions& options) {
   std::vector<std::size_t> wanted;
   if (options.clip) {
     wanted.push_back(reader.find(*options.clip));
-  } else if (!options.from_s && !options.to_s) {
+  } else if (!options.from_s && !options.to_s && !options.joint && !options.preview) {
     return reader.decode_all(options.level);
   }
   for (std::size_t c = 0; !options.clip && c < reader.clips().size(); ++c) wanted.push_back(c);
   std::vector<Clip> out;
   for (const std::size_t c : wanted) {
     Session::check_stop();
+    if (options.preview) {
+      out.push_back(reader.decode_preview(c));
+      continue;
+    }
     const auto [first, count] = frame_range(reader.clips()[c], options);
-    out.push_back(reader.decode(c, first, count, options.level));
+    out.push_back(options.joint ? decode_joint(reader, c, options, first, count)
+                                : reader.decode(c, first, count, options.level));
   }
   return out;
 }
@@ -113,7 +128,7 @@ void run_decode(const DecodeOptions& options) {
   }
   const Json result{{"output", options.output.string()},           {"clips", clips.size()},
                     {"frames", static_cast<std::int64_t>(frames)}, {"levels", reader.levels()},
-                    {"complete", reader.stream().complete()},     {"decode_frames_per_s", frames / seconds}};
+                    {"complete", reader.stream().complete()},      {"decode_frames_per_s", frames / seconds}};
   options.json ? print_json(result) : print_fields(result);
 }
 
@@ -130,6 +145,11 @@ void add_decode(CLI::App& app, Session& /*session*/) {
   command->add_option("--to", options->to_s, "Up to this time, in seconds")->check(CLI::NonNegativeNumber);
   command->add_option("--basis", options->basis, "The library that the stream was encoded with, if it was with one");
   command->add_option("--level", options->level, "Only so many levels of detail")->check(CLI::NonNegativeNumber);
+  command->add_option("--joint", options->joint, "Only that joint, without the others' bytes (streams of qbc)");
+  command->add_flag("--preview", options->preview, "Only the frames that need no decoding (streams of qbc)")
+      ->excludes("--joint")
+      ->excludes("--from")
+      ->excludes("--to");
   command->add_option("--format", options->format, "Ending of the files in a folder")
       ->check(CLI::IsMember({".bvh", ".amc", ".glb", ".gltf"}));
   command->add_flag("--json", options->json, "Print what was decoded as one JSON object");
