@@ -17,6 +17,7 @@
 namespace kinespace {
 namespace {
 
+constexpr std::int32_t far_away = 1000;  // hops from no anchor at all
 constexpr double regularisation = 1e-6;  // e, in mean diagonals of S
 
 // S + e I. Sums are written out: a library's mean adds up in an order of its own.
@@ -62,9 +63,7 @@ class Builder {
         solver_(regularised(cotangent_stiffness(points, triangles))),
         basis_(static_cast<std::size_t>(vertices_ * functions_)),
         residual_(static_cast<std::size_t>(vertices_ * 3)),
-        used_(static_cast<std::size_t>(vertices_)),
-        near_(static_cast<std::size_t>(vertices_)),
-        seen_(static_cast<std::size_t>(vertices_)) {
+        hops_(static_cast<std::size_t>(vertices_), far_away) {
     for (Eigen::Index v = 0; v < vertices_; ++v) {
       for (Eigen::Index c = 0; c < 3; ++c) residual_[static_cast<std::size_t>(3 * v + c)] = points(v, c);
     }
@@ -110,46 +109,43 @@ class Builder {
     count_ += columns;
   }
 
+  // One after the other the vertices with the largest r^2 h^3: r the distance from the projection, h the hops from the
+  // anchors there are. r alone crowds them where this frame has folds, h alone spreads them evenly.
   [[nodiscard]] std::vector<std::int32_t> choose(int wanted) {
-    std::vector<double> distance(static_cast<std::size_t>(vertices_));
-    for (std::size_t v = 0; v < distance.size(); ++v) {
+    std::vector<double> weight(static_cast<std::size_t>(vertices_));
+    for (std::size_t v = 0; v < weight.size(); ++v) {
       const double* const r = residual_.data() + 3 * v;
-      distance[v] = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+      weight[v] = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
     }
-    std::vector<std::int32_t> order(static_cast<std::size_t>(vertices_));
-    std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(), [&](std::int32_t a, std::int32_t b) {
-      const double da = distance[static_cast<std::size_t>(a)], db = distance[static_cast<std::size_t>(b)];
-      return da != db ? da > db : a < b;
-    });
     std::vector<std::int32_t> out;
-    std::fill(near_.begin(), near_.end(), false);
-    for (const bool keep_apart : {true, false}) {
-      for (const std::int32_t v : order) {
-        if (static_cast<int>(out.size()) == wanted) return out;
-        if (used_[static_cast<std::size_t>(v)] || (keep_apart && near_[static_cast<std::size_t>(v)])) continue;
-        used_[static_cast<std::size_t>(v)] = true;
-        out.push_back(v);
-        mark_around(v, wanted);
+    while (static_cast<int>(out.size()) < wanted) {
+      std::int32_t best = -1;
+      double most = -1;
+      for (std::size_t v = 0; v < weight.size(); ++v) {
+        if (hops_[v] == 0) continue;
+        const double hops = hops_[v];
+        const double score = weight[v] * hops * hops * hops;
+        if (score > most) {
+          most = score;
+          best = static_cast<std::int32_t>(v);
+        }
       }
+      out.push_back(best);
+      walk_from(best);
     }
     return out;
   }
 
-  // Marks what is closer to v than three quarters of the distance at which as many anchors as there are now would lie
-  // evenly.
-  void mark_around(std::int32_t v, int wanted) {
-    const double apart = std::sqrt(static_cast<double>(vertices_) / (count_ + wanted));
-    const int rings = std::max(2, static_cast<int>(0.75 * apart));
-    ring_.assign(1, v);
-    std::fill(seen_.begin(), seen_.end(), false);
-    seen_[static_cast<std::size_t>(v)] = true;
-    for (int r = 0; r < rings; ++r) {
+  // Lowers the hops of what is closer to a new anchor than to those before it.
+  void walk_from(std::int32_t anchor) {
+    hops_[static_cast<std::size_t>(anchor)] = 0;
+    ring_.assign(1, anchor);
+    for (std::int32_t hops = 1; !ring_.empty(); ++hops) {
       next_ring_.clear();
       for (const std::int32_t a : ring_) {
         for (const std::int32_t b : neighbours_.of(a)) {
-          if (seen_[static_cast<std::size_t>(b)]) continue;
-          seen_[static_cast<std::size_t>(b)] = near_[static_cast<std::size_t>(b)] = true;
+          if (hops_[static_cast<std::size_t>(b)] <= hops) continue;
+          hops_[static_cast<std::size_t>(b)] = hops;
           next_ring_.push_back(b);
         }
       }
@@ -270,7 +266,7 @@ class Builder {
   SparseSolver solver_;
   std::vector<double> basis_;     // by rows
   std::vector<double> residual_;  // of the mesh, by rows
-  std::vector<bool> used_, near_, seen_;
+  std::vector<std::int32_t> hops_;
   std::vector<std::int32_t> ring_, next_ring_;
   std::vector<std::int32_t> anchors_;
   std::vector<double> block_, turned_, held_, scratch_;

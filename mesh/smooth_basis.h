@@ -4,13 +4,12 @@
 // span: around each of a number of anchor vertices a, the function
 //     (S + e I)^-p delta_a       (least-squares meshes and geometry-aware bases, sorkine 2004 and 2005: p = 2)
 // with the cotangent stiffness S of mesh/laplacian.h and a tiny e, p = 3 here (triharmonic: closer to the harmonics),
-// and one constant for each connected component. Anchors are chosen as sorkine 2005 does: in rounds, where the mesh
-// itself is farthest from its projection on the functions found so far, well apart from each other within a round. A
-// decoder that has the mesh finds the same anchors, so they cost no bits.
+// and one constant for each connected component. Anchors are chosen in rounds (sorkine 2005), where the mesh itself is
+// far from its projection on the functions found so far and where other anchors are far along its edges. A decoder that
+// has the mesh finds the same anchors, so they cost no bits.
 //
 // The functions are orthonormal (U' U = I, no masses: KG does not weigh by area), coarse ones first. Projection on
-// them: mesh/projection.h. Compared with as many harmonics the KG error of projecting real sequences is about the same
-// (bench mesh has the figures).
+// them: mesh/projection.h. The KG error of projecting real sequences on them is that of as many harmonics, or lower.
 #pragma once
 
 #include <cstdint>
