@@ -9,7 +9,8 @@
 // has the mesh finds the same anchors, so they cost no bits.
 //
 // The functions are orthonormal (U' U = I, no masses: KG does not weigh by area), coarse ones first. Projection on
-// them: mesh/projection.h. The KG error of projecting real sequences on them is that of as many harmonics, or lower.
+// them: mesh/projection.h. The KG error of projecting real sequences on them, against as many harmonics:
+// 5 to 18 % lower for articulated motion, up to 10 % higher for cloth.
 #pragma once
 
 #include <cstdint>
