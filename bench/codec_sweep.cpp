@@ -26,12 +26,12 @@ struct Quality {
 const std::vector<Quality>& qualities() {
   static const std::vector<Quality> all{
       {"motion-space", "step", {0.35, 0.7, 1.4, 2.8, 5.6, 11, 16, 22}},
-      {"qbc", "max-squared-distance", {0.5, 1, 2, 4, 7, 12, 18, 28, 50, 100}},
-      {"pca", "components", {36, 30, 26, 22, 18, 15, 12, 9, 7, 5}},
-      {"dwt", "threshold", {0.5, 1, 2, 3, 4, 7, 10, 15, 25, 40}},
-      {"awt", "coefficients", {200, 120, 80, 60, 45, 35, 25, 18, 12, 8}},
-      {"fourier", "tolerance", {0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2}},
-      {"legendre", "tolerance", {0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2}},
+      {"qbc", "max-squared-distance", {2, 4, 7, 12, 18, 28, 50, 100, 200, 400}},
+      {"pca", "components", {40, 32, 26, 22, 18, 15, 13, 11, 9, 7, 5}},
+      {"dwt", "threshold", {0.5, 0.7, 1, 1.4, 2, 3, 4, 5.5, 7, 10, 15, 20, 30}},
+      {"awt", "coefficients", {640, 320, 200, 120, 80, 60, 45, 35, 25, 18, 12}},
+      {"fourier", "tolerance", {0.01, 0.02, 0.04, 0.08, 0.16, 0.32}},
+      {"legendre", "tolerance", {0.01, 0.02, 0.04, 0.08, 0.16, 0.32}},
   };
   return all;
 }
