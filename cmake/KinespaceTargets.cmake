@@ -10,7 +10,7 @@ target_compile_options(kinespace_build_flags INTERFACE
 target_compile_options(kinespace_build_flags INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast
   -Wno-missing-field-initializers  # designated initialisers leave fields at their defaults on purpose
-  -Wno-restrict  # GCC 12 sees overlaps that are not there in "literal" + std::string (GCC bug 105651)
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>  # GCC 12 sees overlaps that are not there in "literal" + std::string (GCC bug 105651)
   $<$<BOOL:${KINESPACE_WERROR}>:-Werror>)
 if(KINESPACE_SANITIZE)
   target_compile_options(kinespace_build_flags INTERFACE -fsanitize=${KINESPACE_SANITIZE} -fno-omit-frame-pointer)
