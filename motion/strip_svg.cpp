@@ -1,6 +1,8 @@
 #include "motion/strip_svg.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 #include "motion/text.h"
@@ -37,6 +39,20 @@ void attribute(std::string& out, std::string_view name, std::string_view value) 
   out += "=\"";
   out += value;
   out += '"';
+}
+
+std::string base64(std::string_view bytes) {
+  constexpr std::string_view digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  out.reserve((bytes.size() + 2) / 3 * 4);
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    const std::size_t count = std::min<std::size_t>(3, bytes.size() - i);
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group = group << 8U | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    for (std::size_t k = 0; k < 4; ++k) out += k <= count ? digits[group >> (18 - 6 * k) & 63U] : '=';
+  }
+  return out;
 }
 
 void attribute(std::string& out, std::string_view name, double value) {
@@ -103,6 +119,17 @@ void Svg::label(const Point& at, std::string_view words, std::string_view anchor
   attribute(text_, "text-anchor", anchor);
   attribute(text_, "fill", colour);
   text_.append(">").append(escaped(words)).append("</text>\n");
+}
+
+void Svg::image(const Point& corner, const Point& size, std::string_view png) {
+  text_ += "<image";
+  attribute(text_, "x", corner.x());
+  attribute(text_, "y", corner.y());
+  attribute(text_, "width", size.x());
+  attribute(text_, "height", size.y());
+  attribute(text_, "style", "image-rendering:pixelated");
+  attribute(text_, "href", "data:image/png;base64," + base64(png));
+  text_ += "/>\n";
 }
 
 std::string Svg::finish() && {

@@ -1,4 +1,4 @@
-// Pictures as SVG text: lines, circles, rectangles and labels. Private to this folder.
+// Pictures as SVG text: lines, circles, rectangles, labels and images. For the library's own pictures.
 //
 // Coordinates are pixels, x to the right, y down, written with two decimals, so that equal pictures are equal texts.
 #pragma once
@@ -23,6 +23,8 @@ class Svg {
   void rectangle(const Point& corner, const Point& size, std::string_view fill);
   // `anchor`: start, middle or end. What XML cannot hold (control characters, bytes that are not UTF-8) becomes '?'.
   void label(const Point& at, std::string_view words, std::string_view anchor, double size, std::string_view colour);
+  // A PNG file, stretched over the rectangle.
+  void image(const Point& corner, const Point& size, std::string_view png);
   [[nodiscard]] std::string finish() &&;
 
  private:
