@@ -4,11 +4,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/repeat_report.h"
 #include "cli/stream_file.h"
 #include "codecs/registry.h"
 #include "fpca/library_view.h"
@@ -23,6 +25,9 @@ struct InfoOptions {
   std::filesystem::path file;
   std::optional<std::filesystem::path> basis;  // a library, for a stream that was made with one
   bool json = false;
+  std::vector<std::filesystem::path> files;  // all that were named; several only to be compared with each other
+  bool repeats = false;
+  std::optional<std::filesystem::path> picture;
 };
 struct Describer {
   bool (*claims)(const std::filesystem::path& file);
@@ -156,7 +161,17 @@ constexpr std::array describers{
     Describer{[](const std::filesystem::path&) { return true; }, describe_clip},
 };
 
-void run_info(const InfoOptions& options) {
+void run_info(InfoOptions& options, Session& session) {
+  if (options.repeats) {
+    report_repeats({.files = options.files, .picture = options.picture, .json = options.json}, session);
+    return;
+  }
+  if (options.files.size() != 1) {
+    throw Error(ErrorKind::usage, {.found = std::to_string(options.files.size()) + " files",
+                                   .expected = "one",
+                                   .remedy = "name several with --repeats only"});
+  }
+  options.file = options.files.front();
   for (const Describer& describer : describers) {
     if (!describer.claims(options.file)) continue;
     const Json description = describer.describe(options);
@@ -167,13 +182,18 @@ void run_info(const InfoOptions& options) {
 
 }  // namespace
 
-void add_info(CLI::App& app, Session& /*session*/) {
+void add_info(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("info", "What is in a file");
   const auto options = std::make_shared<InfoOptions>();
-  command->add_option("FILE", options->file, "A clip (.bvh, .amc), a library (.kspace) or a stream (.ksm)")->required();
+  command->add_option("FILE", options->files, "A clip (.bvh, .amc), a library (.kspace) or a stream (.ksm)")
+      ->required();
   command->add_option("--basis", options->basis, "The library that a stream was encoded with, if it was with one");
   command->add_flag("--json", options->json, "Print it as one JSON object");
-  command->callback([options] { run_info(*options); });
+  CLI::Option* repeats = command->add_flag(
+      "--repeats", options->repeats, "Which stretches of the clips repeat others (repeated motion analysis, lin2011)");
+  command->add_option("--picture", options->picture, "With --repeats: an SVG of the self-distance table to write")
+      ->needs(repeats);
+  command->callback([options, &session] { run_info(*options, session); });
 }
 
 }  // namespace kinespace::cli
