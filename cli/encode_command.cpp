@@ -131,15 +131,13 @@ void run_encode(const EncodeOptions& options, Session& session) {
   options.json ? print_json(result) : print_fields(result);
 }
 
-std::string settings_help() {
-  std::string out = "A setting of the codec, NAME=NUMBER.";
+void print_settings() {
   for (const Codec* codec : all_codecs()) {
     for (const CodecSetting& setting : codec->settings()) {
-      out += fmt::format("\n{}: {} ({}; {} to {})", codec->name(), setting.name, setting.meaning, setting.least,
-                         setting.most);
+      fmt::print("{:<13} {:<21} {} ({}; {} to {})\n", codec->name(), setting.name, setting.meaning, setting.initial,
+                 setting.least, setting.most);
     }
   }
-  return out;
 }
 
 std::vector<std::string> codec_names() {
@@ -164,7 +162,17 @@ void add_encode(CLI::App& app, Session& session) {
   command->add_option("--basis", options->basis,
                       "A library whose tables the stream may leave out: small streams of single clips, which decode "
                       "takes the library for too (motion-space)");
-  command->add_option("--set", options->settings, settings_help())->allow_extra_args(false);
+  command->add_option("--set", options->settings, "A setting of the codec, NAME=NUMBER; --settings lists them")
+      ->allow_extra_args(false);
+  command
+      ->add_flag_callback(
+          "--settings",
+          [] {
+            print_settings();
+            throw CLI::Success();
+          },
+          "List what the codecs can be set by: meaning (value when not set; range)")
+      ->trigger_on_parse();
   command->add_flag("--json", options->json, "Print what was written as one JSON object");
   command->callback([options, &session] { run_encode(*options, session); });
 }
