@@ -9,11 +9,10 @@
 namespace kinespace {
 namespace {
 
-constexpr double blending_s = 0.03;
-constexpr double damping_cm = 1;
+constexpr double damping_cm = 2;
 constexpr double near_enough_cm = 0.02;
 constexpr double largest_turn = 0.5;  // radians in one round
-constexpr int most_rounds = 8;
+constexpr int most_rounds = 12;
 constexpr int turning_joints = 2;
 
 // (m + damping)^-1 e of a symmetric matrix, by its adjugate.
@@ -78,7 +77,7 @@ class Solver {
   }
   void turn_towards(const Eigen::Vector3d& e, std::span<const std::size_t> turning) {
     const Eigen::Vector3d& end = at_.back();
-    Eigen::Matrix3d jj = damping_cm * damping_cm * Eigen::Matrix3d::Identity();
+    Eigen::Matrix3d jj = (damping_cm * damping_cm + e.squaredNorm()) * Eigen::Matrix3d::Identity();
     for (const std::size_t i : turning) {
       const Eigen::Vector3d r = end - at_[i];
       jj += r.squaredNorm() * Eigen::Matrix3d::Identity() - r * r.transpose();
@@ -99,7 +98,8 @@ class Solver {
   std::vector<Eigen::Vector3d> offset_;
 };
 
-void add_track(const Clip& clip, const ContactTrack& track, int blending, Limb& limb) {
+// `before`, `after`: over how many frames the correction fades on either side.
+void add_track(const Clip& clip, const ContactTrack& track, int before, int after, Limb& limb) {
   const int count = static_cast<int>(track.points.size());
   const int last = track.first + count;
   for (int i = 0; i < count; ++i) {
@@ -107,31 +107,41 @@ void add_track(const Clip& clip, const ContactTrack& track, int blending, Limb& 
     limb.weight[f] = 1;
     limb.target[f] = track.points[static_cast<std::size_t>(i)];
   }
-  const int from = std::max(0, track.first - blending);
-  const int to = std::min(clip.frames, last + blending);
-  const auto before = joint_path(clip, limb.joint, from, track.first - from + 1);
-  const auto after = joint_path(clip, limb.joint, last - 1, to - last + 1);
-  const Eigen::Vector3d first_off = track.points.front() - before.back();
-  const Eigen::Vector3d last_off = track.points.back() - after.front();
-  const auto fade = [&](int frame, int distance, const Eigen::Vector3d& own, const Eigen::Vector3d& off) {
+  const int from = std::max(0, track.first - before);
+  const int to = std::min(clip.frames, last + after);
+  const auto path_before = joint_path(clip, limb.joint, from, track.first - from + 1);
+  const auto path_after = joint_path(clip, limb.joint, last - 1, to - last + 1);
+  const Eigen::Vector3d first_off = track.points.front() - path_before.back();
+  const Eigen::Vector3d last_off = track.points.back() - path_after.front();
+  // Two contacts that are near fade into each other: their corrections add up.
+  const auto fade = [&](int frame, double u, const Eigen::Vector3d& own, const Eigen::Vector3d& off) {
     const auto f = static_cast<std::size_t>(frame);
-    const double u = 1 - static_cast<double>(distance) / (blending + 1);
     const double weight = u * u * (3 - 2 * u);
-    if (weight <= limb.weight[f]) return;  // of another contact, which is nearer
-    limb.weight[f] = weight;
-    limb.target[f] = own + weight * off;
+    if (limb.weight[f] == 0) limb.target[f] = own;
+    limb.target[f] += weight * off;
+    limb.weight[f] += weight;
   };
-  for (int f = from; f < track.first; ++f)
-    fade(f, track.first - f, before[static_cast<std::size_t>(f - from)], first_off);
-  for (int f = last; f < to; ++f) fade(f, f - last + 1, after[static_cast<std::size_t>(f - last + 1)], last_off);
+  for (int f = from; f < track.first; ++f) {
+    const double u = 1 - static_cast<double>(track.first - f) / (before + 1);
+    fade(f, u, path_before[static_cast<std::size_t>(f - from)], first_off);
+  }
+  for (int f = last; f < to; ++f) {
+    const double u = 1 - static_cast<double>(f - last + 1) / (after + 1);
+    fade(f, u, path_after[static_cast<std::size_t>(f - last + 1)], last_off);
+  }
 }
 
-std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> tracks) {
+std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> tracks, double blending_s) {
   const auto frames = static_cast<std::size_t>(clip.frames);
   const int blending = static_cast<int>(std::min(std::ceil(blending_s * clip.rate_hz), 1e4));
   std::vector<Limb> out;
-  // Contacts before their fading, so that no fading takes a frame of a contact.
-  for (const ContactTrack& track : tracks) {
+  for (std::size_t t = 0; t < tracks.size(); ++t) {
+    const ContactTrack& track = tracks[t];
+    const auto end_of = [](const ContactTrack& one) { return one.first + static_cast<int>(one.points.size()); };
+    const bool follows = t > 0 && tracks[t - 1].joint == track.joint;
+    const bool leads = t + 1 < tracks.size() && tracks[t + 1].joint == track.joint;
+    const int before = follows ? std::clamp(track.first - end_of(tracks[t - 1]), 0, blending) : blending;
+    const int after = leads ? std::clamp(tracks[t + 1].first - end_of(track), 0, blending) : blending;
     if (out.empty() || out.back().joint != track.joint) {
       Limb limb{
           .joint = track.joint,
@@ -150,15 +160,15 @@ std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> track
       limb.target.assign(frames, Eigen::Vector3d::Zero());
       out.push_back(std::move(limb));
     }
-    add_track(clip, track, blending, out.back());
+    add_track(clip, track, before, after, out.back());
   }
   return out;
 }
 
 }  // namespace
 
-void hold_contacts(Clip& clip, std::span<const ContactTrack> tracks) {
-  std::vector<Limb> limbs = limbs_of(clip, tracks);
+void hold_contacts(Clip& clip, std::span<const ContactTrack> tracks, double blending_s) {
+  std::vector<Limb> limbs = limbs_of(clip, tracks, blending_s);
   const int root = clip.skeleton.travel_root();
   Solver solver;
   std::vector<std::size_t> turning;

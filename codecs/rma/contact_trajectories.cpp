@@ -131,16 +131,22 @@ std::vector<Eigen::Vector3d> joint_path(const Clip& clip, int joint, int first, 
 std::vector<ContactCode> code_contacts(std::span<const ContactTrack> tracks, const Clip& decoded,
                                        const ContactOptions& options) {
   std::vector<ContactCode> out;
+  constexpr double reach_cm = ContactCode::farthest_start * ContactCode::start_step_cm;
   for (const ContactTrack& track : tracks) {
-    ContactCode code{.joint = track.joint, .first = track.first, .start = {}, .moves = {}};
-    Eigen::Vector3d at = joint_path(decoded, track.joint, track.first, 1).front();
+    const auto path = joint_path(decoded, track.joint, track.first, static_cast<int>(track.points.size()));
+    // From where on the decoded joint is within what a start can tell.
+    std::size_t start = 0;
+    while (start < path.size() && (track.points[start] - path[start]).cwiseAbs().maxCoeff() > reach_cm) ++start;
+    if (path.size() - start < 2) continue;
+    ContactCode code{.joint = track.joint, .first = track.first + static_cast<int>(start), .start = {}, .moves = {}};
+    Eigen::Vector3d at = path[start];
     for (std::size_t k = 0; k < 3; ++k) {
       const auto axis = static_cast<Eigen::Index>(k);
       code.start[k] =
-          steps(track.points.front()[axis] - at[axis], ContactCode::start_step_cm, ContactCode::farthest_start);
+          steps(track.points[start][axis] - at[axis], ContactCode::start_step_cm, ContactCode::farthest_start);
       at[axis] += code.start[k] * ContactCode::start_step_cm;
     }
-    for (std::size_t i = 1; i < track.points.size(); ++i) {
+    for (std::size_t i = start + 1; i < track.points.size(); ++i) {
       std::array<std::int8_t, 3> move{};
       for (std::size_t k = 0; k < 3; ++k) {
         const auto axis = static_cast<Eigen::Index>(k);

@@ -450,7 +450,7 @@ void RepeatEncoder::measure(Coding& coding) const {
     progress_.check_stop();
     Clip decoded = decoder.decode_without_contacts(c);
     attempt.tables.contacts[c] = code_contacts(contacts_[c], decoded, contact_options);
-    hold_contacts(decoded, contact_tracks(attempt.tables.contacts[c], decoded));
+    hold_contacts(decoded, contact_tracks(attempt.tables.contacts[c], decoded), contact_blending_s);
     parts[c] = clip_error(clips_[c], decoded, 0, clips_[c].frames, 0);
   });
   for (const ClipErrorSums& part : parts) attempt.error.add(part);

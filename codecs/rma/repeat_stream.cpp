@@ -203,7 +203,7 @@ Clip RepeatDecoder::decode_without_contacts(std::size_t clip) const {
 
 Clip RepeatDecoder::decode(std::size_t clip) const {
   Clip out = decode_without_contacts(clip);
-  hold_contacts(out, contact_tracks(tables_.contacts[clip], out));
+  hold_contacts(out, contact_tracks(tables_.contacts[clip], out), contact_blending_s);
   return out;
 }
 

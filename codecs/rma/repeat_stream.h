@@ -20,6 +20,9 @@
 
 namespace kinespace {
 
+// How long a contact fades out: longer than the paper's, as coarser postures are farther off.
+inline constexpr double contact_blending_s = 0.15;
+
 struct RepeatTables {
   MotionSpaceTables tables;
   CoefficientTables predicted;

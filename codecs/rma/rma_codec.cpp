@@ -4,8 +4,11 @@
 
 #include "base/error.h"
 #include "codecs/registry.h"
+#include "codecs/rma/marker_reader.h"
+#include "codecs/rma/marker_stream.h"
 #include "codecs/rma/paper_profile.h"
 #include "codecs/rma/repeat_profile.h"
+#include "codecs/rma/repeat_stream.h"
 
 namespace kinespace {
 namespace {
@@ -42,6 +45,41 @@ Bytes RmaCodec::encode(std::span<const Clip> clips, const CodecOptions& options)
                                .primary_bits = static_cast<int>(setting(options, "primary_bits")),
                                .repeated_bits = static_cast<int>(setting(options, "repeated_bits"))},
                               options.progress);
+}
+
+std::vector<std::vector<int>> rma_seams(std::span<const std::byte> bytes, std::string source) {
+  const Bitstream stream = Bitstream::parse(bytes, std::move(source));
+  stream.require_kind(stream_kind("rma"));
+  const ClipTable table = unpack_clip_table(stream.section("clips"), most_frames(stream.size()), stream.source());
+  const int joints = static_cast<int>(table.skeletons.front().rotating_joints().size());
+  const std::int64_t numbers = most_numbers(stream.size());
+  std::vector<std::vector<int>> out(table.clips.size());
+  const auto add = [&](std::size_t clip, int first) {
+    if (first > 0 && first < table.clips[clip].frames) out[clip].push_back(first);
+  };
+  if (stream.option("profile") == "paper") {
+    const MarkerStream motion =
+        unpack_marker_stream(stream.section("motion"), table, 3 + 6 * joints, numbers, stream.source());
+    std::size_t piece = 0;
+    for (std::size_t c = 0; c < out.size(); ++c) {
+      for (int f = 0; f < table.clips[c].frames && piece < motion.clips.size(); f += motion.clips[piece++].frames) {
+        add(c, f);
+      }
+    }
+    return out;
+  }
+  RepeatTables tables;
+  tables.tables = unpack_motion_space_tables(stream.section("tables"), joints, stream.source());
+  unpack_repeats(stream.section("repeats"), table, numbers, stream.source(), tables);
+  std::size_t window = 0;
+  for (std::size_t c = 0; c < out.size(); ++c) {
+    int first = 0;
+    for (const int points : table.clips[c].blocks) {
+      if (!tables.jumps[window++]) add(c, first);
+      first += points;
+    }
+  }
+  return out;
 }
 
 std::unique_ptr<StreamReader> RmaCodec::open(Bitstream stream) const {

@@ -26,4 +26,8 @@ class RmaCodec final : public Codec {
   [[nodiscard]] std::unique_ptr<StreamReader> open(Bitstream stream) const override;
 };
 
+// By clip: the frames at which coded pieces of it meet (clips of the analysis, windows), but for jumps of the motion
+// itself. Throws Error{bad_input} naming `source`.
+[[nodiscard]] std::vector<std::vector<int>> rma_seams(std::span<const std::byte> stream, std::string source);
+
 }  // namespace kinespace
