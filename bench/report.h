@@ -95,6 +95,7 @@ struct Bench {
 [[nodiscard]] BenchReport bench_kernels(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_playback(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_retrieval(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_rma(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_search(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_transitions(const BenchOptions& options);
 
