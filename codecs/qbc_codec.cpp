@@ -5,7 +5,6 @@
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -13,10 +12,10 @@
 #include "base/error.h"
 #include "codecs/clip_error.h"
 #include "codecs/qbc/curve_choice.h"
+#include "codecs/qbc/pole_corrections.h"
 #include "codecs/qbc/qbc_stream.h"
 #include "codecs/registry.h"
 #include "fpca/curves.h"
-#include "motion/euler.h"
 
 namespace kinespace {
 namespace {
@@ -29,8 +28,6 @@ constexpr std::array qbc_settings{
     CodecSetting{"merge", 1, 0, 1, "1: breaks chosen by error and bits; 0: the paper's rule alone"},
     CodecSetting{"rate-weight", 0.05, 0, 1, "share of the limit that a bit is worth when breaks and points are chosen"},
 };
-
-constexpr double most_of_pole = 30;
 
 struct Plan {
   double limit = 18;
@@ -63,7 +60,6 @@ class QbcEncoder {
       require_encodable(channels_.back(), clip.name);
     }
     packed_clips_ = pack_clip_table(table_);
-    root_turn_ = root_turn();
     for (std::size_t c = 0; c < clips.size(); ++c) {
       for (std::size_t j = 0; j < layout_.joints.size(); ++j) {
         if (curve_dimensions(layout_, j) > 0) curves_.emplace_back(c, j);
@@ -78,15 +74,16 @@ class QbcEncoder {
   };
 
   [[nodiscard]] Result encode(const Plan& plan, const Progress& progress) const {
-    const QbcTables tables{.interval = plan.interval,
-                           .step_index = step_index_of(plan),
-                           .root_unit = static_cast<float>(plan.root_unit),
-                           .root_turn = plan.paper ? 1 : root_turn_};
+    const QbcTables tables{
+        .interval = plan.interval, .step_index = step_index_of(plan), .root_unit = static_cast<float>(plan.root_unit)};
     std::vector<QbcCurve> coded(curves_.size());
     std::atomic<std::size_t> done = 0;
     std::atomic<bool> kept = true;
     tbb::parallel_for(std::size_t{0}, curves_.size(), [&](std::size_t i) {
-      const CurveChoice choice = choose_curve(task(curves_[i].first, curves_[i].second, plan, tables), plan.paper);
+      const auto [clip, joint] = curves_[i];
+      const CurveTask wanted = task(clip, joint, plan, tables);
+      CurveChoice choice = choose_curve(wanted, plan.paper);
+      if (joint == 0 && !plan.paper) correct_poles(clip, wanted, choice);
       if (choice.error.largest > plan.limit) kept = false;
       coded[i] = {.finer = choice.task.step_index - tables.step_index,
                   .grid_log = bit_length(static_cast<std::uint64_t>(choice.task.grid)) - 1,
@@ -112,21 +109,11 @@ class QbcEncoder {
     }
   }
 
-  // Near the poles of the file's own angles of the root a small turn moves two of them far: what a degree counts for,
-  // so that errors in the file's channels are spread as everywhere else. 1 for a body that stays upright and looks
-  // ahead.
-  [[nodiscard]] float root_turn() const {
-    double sum = 0, frames = 0;
-    for (const Clip& clip : clips_) {
-      const int root = clip.skeleton.travel_root();
-      const EulerOrder order = euler_order(clip.skeleton.joints[static_cast<std::size_t>(root)].channels);
-      for (int f = 0; f < clip.frames; ++f) {
-        const double cosine = std::cos(euler_angles(order, clip.rotation(root, f))[1] * std::numbers::pi / 180);
-        sum += std::min(1 / (cosine * cosine), most_of_pole);
-      }
-      frames += clip.frames;
-    }
-    return static_cast<float>(std::sqrt((1 + 2 * sum / frames) / 3));
+  void correct_poles(std::size_t clip, const CurveTask& wanted, CurveChoice& choice) const {
+    const CurveShape shape = shape_of(choice.task);
+    choice.numbers.corrections = PoleCorrections(clips_[clip], layout_.joints.front())
+                                     .choose(wanted, decode_curve(shape, choice.code, "the curve"));
+    choice.code = encode_curve(shape, choice.numbers);
   }
 
   [[nodiscard]] CurveTask task(std::size_t clip, std::size_t joint, const Plan& plan, const QbcTables& tables) const {
@@ -144,9 +131,7 @@ class QbcEncoder {
       const bool position = joint == 0 && d < 3;
       const int turn = joint == 0 ? d - 3 : d;
       const auto channel = channels_[clip].channel(position ? d : freedom.first_channel + turn);
-      const double unit = position     ? static_cast<double>(tables.root_unit)
-                          : joint == 0 ? 1 / static_cast<double>(tables.root_turn)
-                                       : 1;
+      const double unit = position ? static_cast<double>(tables.root_unit) : 1;
       for (std::size_t f = 0; f < channel.size(); ++f)
         out.values[f * n + static_cast<std::size_t>(d)] = channel[f] / unit;
     }
@@ -180,7 +165,6 @@ class QbcEncoder {
   ChannelLayout layout_;
   ClipTable table_;
   Bytes packed_clips_;
-  float root_turn_ = 1;
   std::vector<ChannelCurves> channels_;
   std::vector<std::pair<std::size_t, std::size_t>> curves_;  // clip, joint
 };

@@ -172,12 +172,27 @@ CurveNumbers choose_numbers(const CurveTask& task, const std::vector<int>& break
   return NumberChoice(task, breaks).choose();
 }
 
+namespace {
+
+void correct(const CodedCurve& curve, std::size_t dimensions, int first, int count, std::vector<double>& out) {
+  const auto n = static_cast<std::size_t>(count);
+  auto one = std::ranges::lower_bound(curve.corrections, first, {}, &FrameCorrection::frame);
+  for (; one != curve.corrections.end() && one->frame < first + count; ++one) {
+    for (std::size_t d = 3; d < dimensions; ++d) {
+      out[d * n + static_cast<std::size_t>(one->frame - first)] += one->turn(d - 3, curve.step_index);
+    }
+  }
+}
+
+}  // namespace
+
 void evaluate(const CodedCurve& curve, int dimensions, int first, int count, std::vector<double>& out) {
   const auto n = static_cast<std::size_t>(count);
   const auto dims = static_cast<std::size_t>(dimensions);
   out.resize(dims * n);
   if (curve.breaks.size() < 2) {
     for (std::size_t d = 0; d < dims; ++d) out[d * n] = curve.ends[d];
+    correct(curve, dims, first, count, out);
     return;
   }
   const auto next = std::ranges::lower_bound(curve.breaks, first);
@@ -196,6 +211,7 @@ void evaluate(const CodedCurve& curve, int dimensions, int first, int count, std
       }
     }
   }
+  correct(curve, dims, first, count, out);
 }
 
 CurveError curve_error(const CurveTask& task, const CodedCurve& curve) {
@@ -222,7 +238,8 @@ namespace {
 
 CurveChoice code_with(const CurveTask& task, const std::vector<int>& breaks) {
   const CurveShape shape = shape_of(task);
-  CurveChoice out{.task = task, .code = encode_curve(shape, choose_numbers(task, breaks))};
+  CurveChoice out{.task = task, .numbers = choose_numbers(task, breaks)};
+  out.code = encode_curve(shape, out.numbers);
   out.error = curve_error(task, decode_curve(shape, out.code, "the curve"));
   return out;
 }

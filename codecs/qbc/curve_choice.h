@@ -42,6 +42,7 @@ void evaluate(const CodedCurve& curve, int dimensions, int first, int count, std
 
 struct CurveChoice {
   CurveTask task;  // with the grid and the step that were taken
+  CurveNumbers numbers;
   Bytes code;
   CurveError error;
 };

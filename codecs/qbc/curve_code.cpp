@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <type_traits>
 
 #include "base/error.h"
 #include "codecs/qbc/curve_priors.h"
@@ -22,28 +21,6 @@ int half_octaves(int x) {
 
 int class_of(int x) {
   return std::min(bit_length(static_cast<std::uint64_t>(x)), 11);
-}
-
-// Coding and decoding are one piece of code: `value` is written by a RangeEncoder, and set by a RangeDecoder.
-template <typename Coder>
-inline constexpr bool encodes = std::is_same_v<Coder, RangeEncoder>;
-
-template <typename Coder>
-void code_bit(Coder& coder, AdaptiveBit& model, bool& bit) {
-  if constexpr (encodes<Coder>) {
-    coder.encode(bit, model);
-  } else {
-    bit = coder.decode(model);
-  }
-}
-
-template <typename Coder>
-void code_even(Coder& coder, bool& bit) {
-  if constexpr (encodes<Coder>) {
-    coder.encode_even(bit);
-  } else {
-    bit = coder.decode_even();
-  }
 }
 
 template <typename Coder>
@@ -69,6 +46,11 @@ class CurveCoder {
     context_.see(kind, d, value);
   }
   void begin_point(int length) { context_.begin_point(length); }
+
+  void corrections(std::vector<FrameCorrection>& list) {
+    const int turns = corrected_turns(shape_.dimensions);
+    if (turns > 0 && !CorrectionCoder<Coder>(coder_, shape_.frames, turns).code(list)) damaged();
+  }
 
   // Lengths of the segments of an interval of `rest` frames, whole grid steps but for the last.
   void lengths(int rest, std::vector<int>& out) {
@@ -154,7 +136,8 @@ class CurveDecoder {
   CurveDecoder(const CurveShape& shape, std::span<const std::byte> bytes, const std::string& source)
       : shape_(shape), n_(static_cast<std::size_t>(shape.dimensions)), coder_(bytes), code_(coder_, shape, source) {}
 
-  std::vector<double> common() {
+  std::vector<double> common(std::vector<FrameCorrection>& corrections) {
+    code_.corrections(corrections);
     std::vector<double> out;
     const double step = end_step(shape_.step(), 16, 16);
     for (int i = 0; i <= shape_.interval_count(); ++i) {
@@ -171,8 +154,8 @@ class CurveDecoder {
   }
 
   CodedCurve whole() {
-    const std::vector<double> goals = common();
-    CodedCurve out{.breaks = {0}};
+    CodedCurve out{.breaks = {0}, .step_index = shape_.step_index};
+    const std::vector<double> goals = common(out.corrections);
     out.ends.assign(goals.begin(), goals.begin() + static_cast<std::ptrdiff_t>(n_));
     CurvePredictor predictor(shape_);
     std::vector<int> lengths;
@@ -325,6 +308,8 @@ Bytes encode_curve(const CurveShape& shape, const CurveNumbers& numbers) {
   const std::string none;
   CurveCoder<RangeEncoder> code(coder, shape, none);
   const auto n = static_cast<std::size_t>(shape.dimensions);
+  std::vector<FrameCorrection> corrections = numbers.corrections;
+  code.corrections(corrections);
   for (std::size_t i = 0; i < numbers.common.size(); ++i) {
     if (i % n == 0) code.begin_point(1);
     std::int64_t number = numbers.common[i];
@@ -360,7 +345,15 @@ CodedCurve decode_curve(const CurveShape& shape, std::span<const std::byte> byte
 
 std::vector<double> decode_common(const CurveShape& shape, std::span<const std::byte> bytes,
                                   const std::string& source) {
-  return CurveDecoder(shape, bytes, source).common();
+  std::vector<FrameCorrection> corrections;
+  std::vector<double> out = CurveDecoder(shape, bytes, source).common(corrections);
+  const auto n = static_cast<std::size_t>(shape.dimensions);
+  for (const FrameCorrection& one : corrections) {
+    if (one.frame % shape.interval != 0 && one.frame != shape.frames - 1) continue;
+    const auto i = static_cast<std::size_t>((one.frame + shape.interval - 1) / shape.interval);
+    for (std::size_t d = 3; d < n; ++d) out[i * n + d] += one.turn(d - 3, shape.step_index);
+  }
+  return out;
 }
 
 }  // namespace kinespace

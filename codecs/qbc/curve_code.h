@@ -1,7 +1,8 @@
 // The code of one joint's curve in a qbc stream: quadratic Bezier segments with quantised control points.
 //
-//   the curve at the common breaks, every `interval` frames and at the last (the paper's I frames): they come first, so
-//   that a preview reads no further
+//   of the travel root: frames that are corrected (codecs/qbc/frame_corrections.h)
+//   the curve at the common breaks, every `interval` frames and at the last (the paper's I frames): a preview reads no
+//   further
 //   for each interval: how many segments, their lengths in grid steps; then for each its end (but for the last, whose
 //   end is there already) and its middle
 //
@@ -17,6 +18,7 @@
 #include <vector>
 
 #include "codecs/qbc/curve_task.h"
+#include "codecs/qbc/frame_corrections.h"
 #include "codecs/range_coder.h"
 
 namespace kinespace {
@@ -39,6 +41,8 @@ struct CodedCurve {
   std::vector<int> breaks;
   std::vector<double> ends;
   std::vector<double> middles;
+  std::vector<FrameCorrection> corrections;  // ascending frames
+  int step_index = 0;                        // of the shape
 };
 
 // Steps for a point that counts for so many frames.
@@ -108,6 +112,7 @@ class SizeContext {
 // The numbers of a curve in the order of the code; chosen by the encoder.
 struct CurveNumbers {
   std::vector<int> breaks;
+  std::vector<FrameCorrection> corrections;
   std::vector<std::int64_t> common;  // [common break][dimension]
   std::vector<std::int64_t>
       points;  // by segment: its end unless that is a common break; its middle unless it is 1 long

@@ -141,7 +141,6 @@ class QbcReader final : public StreamReader {
       turns = 3 * n;
       for (double& v : values.first(turns)) v *= static_cast<double>(curves_.tables.root_unit);
       write_root_position(values.first(turns), 0, count, out);
-      for (double& v : values.subspan(turns)) v /= static_cast<double>(curves_.tables.root_turn);
     }
     write_joint_channels(curves_.layout.joints[joint], values.subspan(turns), 0, count, out);
   }

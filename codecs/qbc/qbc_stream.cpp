@@ -30,12 +30,9 @@ Bytes pack_table(const QbcTables& tables, std::span<const QbcCurve> curves) {
   IntegerWriter out;
   out.put(tables.interval, interval_number);
   out.put(tables.step_index, step_number);
-  const bool usual = tables.root_unit == QbcTables{}.root_unit && tables.root_turn == QbcTables{}.root_turn;
+  const bool usual = tables.root_unit == QbcTables{}.root_unit;
   out.put(usual ? 0 : 1, unit_flag);
-  if (!usual) {
-    put_float(out, tables.root_unit);
-    put_float(out, tables.root_turn);
-  }
+  if (!usual) put_float(out, tables.root_unit);
   for (const QbcCurve& curve : curves) {
     out.put(curve.finer, finer_number);
     out.put(curve.grid_log - 1, grid_number);
@@ -48,13 +45,8 @@ QbcTables get_tables(IntegerReader& in) {
   QbcTables out;
   out.interval = static_cast<int>(in.get_between(1, longest_segment, interval_number));
   out.step_index = static_cast<int>(in.get_between(-QbcTables::finest, QbcTables::finest, step_number));
-  if (in.get_between(0, 1, unit_flag) == 1) {
-    out.root_unit = get_float(in);
-    out.root_turn = get_float(in);
-  }
-  for (const float scale : {out.root_unit, out.root_turn}) {
-    if (!(scale >= 1e-4F && scale <= 1e4F)) in.damaged();
-  }
+  if (in.get_between(0, 1, unit_flag) == 1) out.root_unit = get_float(in);
+  if (!(out.root_unit >= 1e-4F && out.root_unit <= 1e4F)) in.damaged();
   return out;
 }
 

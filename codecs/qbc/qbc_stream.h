@@ -4,8 +4,8 @@
 //   curves   length and bytes of the joints' channels (codecs/joint_channels.h); length and bytes of the table of
 //            curves; the curves, clip by clip and joint by joint. Joints that never turn have none
 //
-// The table: the interval of the common breaks, the quantiser step, the root's unit and what its turns count
-// for; of each curve how much finer its step is, log2 of the grid that its breaks stand on, and how many bytes it has.
+// The table: the interval of the common breaks, the quantiser step and the root's unit; of each curve how much
+// finer its step is, log2 of the grid that its breaks stand on, and how many bytes it has.
 // Private to this folder.
 #pragma once
 
@@ -29,7 +29,6 @@ struct QbcTables {
   int interval = 160;
   int step_index = 0;
   float root_unit = 5.6444F;  // cm
-  float root_turn = 1;        // what a degree of the root's turns counts as
 
   [[nodiscard]] CurveShape shape(int frames, int dimensions, int finer, int grid_log) const {
     return {.frames = frames,

@@ -2,6 +2,7 @@
 #include "codecs/qbc_codec.h"
 
 #include <cmath>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -9,7 +10,9 @@
 #include "codecs/joint_channels.h"
 #include "codecs/qbc/curve_choice.h"
 #include "codecs/qbc/qbc_stream.h"
+#include "motion/euler.h"
 #include "motion/read.h"
+#include "tests/codecs/forged_stream.h"
 #include "tests/codecs/sample_stream.h"
 #include "tests/support/data.h"
 
@@ -132,6 +135,73 @@ TEST(Qbc, the_preview_is_the_clip_at_the_common_breaks) {
     }
     EXPECT_LT((preview.translation(0, i) - whole.translation(0, f)).norm(), 1e-9);
   }
+}
+
+// A walk that leans over until the middle angle of the root's Z X Y passes 90 degrees.
+Clip walk_through_a_pole() {
+  Clip out = test::sample_clips()[0];
+  for (int f = 0; f < out.frames; ++f) {
+    const double lean = (44 + 100.0 * f / (out.frames - 1)) * std::numbers::pi / 180;
+    out.set_rotation(0, f, Eigen::AngleAxisd(lean, Eigen::Vector3d::UnitX()) * out.rotation(0, f));
+  }
+  return out;
+}
+
+// Of a frame's angles of the root as a file tells them.
+double file_error(const Clip& clip, const Clip& decoded, int frame) {
+  const EulerOrder order = euler_order(clip.skeleton.joints[0].channels);
+  const EulerAngles a = euler_angles(order, clip.rotation(0, frame));
+  const EulerAngles b = euler_angles(order, decoded.rotation(0, frame), a);
+  return std::pow(a[0] - b[0], 2) + std::pow(a[1] - b[1], 2) + std::pow(a[2] - b[2], 2);
+}
+
+TEST(Qbc, the_roots_file_angles_stay_near_at_their_poles) {
+  const Clip clip = walk_through_a_pole();
+  for (const double limit : {0.5, 4.0, 18.0, 100.0}) {
+    const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max-squared-distance", limit}}});
+    const auto reader = open(stream);
+    const Clip decoded = reader->decode(0, -1);
+    const ChannelLayout layout = find_channel_layout(std::span(&clip, 1));
+    EXPECT_LE(largest_squared_distance(clip, decoded, layout), limit * (1 + 1e-6));
+    double largest = 0;
+    for (int f = 0; f < clip.frames; ++f) largest = std::max(largest, file_error(clip, decoded, f));
+    EXPECT_LE(largest, 2.5 * limit) << limit;
+  }
+}
+
+TEST(Qbc, previews_and_parts_have_the_corrections_of_the_whole) {
+  const Clip clip = walk_through_a_pole();
+  const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max-squared-distance", 8}, {"interval", 1}}});
+  const auto reader = open(stream);
+  const Clip whole = reader->decode(0, -1);
+  const Clip preview = reader->decode_preview(0);
+  ASSERT_EQ(preview.frames, clip.frames);
+  for (int f = 0; f < clip.frames; ++f) {
+    EXPECT_LT(preview.rotation(0, f).angularDistance(whole.rotation(0, f)), 1e-9) << f;
+    EXPECT_TRUE(test::same(reader->decode(0, f, 1, -1), slice(whole, f, 1))) << f;
+  }
+}
+
+TEST(Qbc, damaged_curves_with_corrections_are_errors_or_clips) {
+  const Clip clip = slice(walk_through_a_pole(), 40, 70);
+  const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max-squared-distance", 4}}});
+  const Bytes whole = test::part(stream, "curves");
+  int errors = 0;
+  for (std::size_t n = 0; n < whole.size(); ++n) {
+    for (const auto mask : {std::byte{0x01}, std::byte{0x80}, std::byte{0xff}}) {
+      Bytes changed = whole;
+      changed[n] ^= mask;
+      try {
+        const Bytes forged = test::forged(stream, "curves", changed);
+        const Clip decoded = open(forged)->decode(0, -1);
+        for (const double q : decoded.rotations) ASSERT_TRUE(std::isfinite(q)) << n;
+      } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::bad_input) << error.what();
+        ++errors;
+      }
+    }
+  }
+  EXPECT_GT(errors, 100);
 }
 
 TEST(Qbc, parts_of_a_clip_equal_the_whole) {
