@@ -1,4 +1,5 @@
 // What every codec owes the one who opens a stream: clips, or an error that names the file, for any bytes at all.
+#include <cmath>
 #include <map>
 
 #include <gtest/gtest.h>
@@ -103,6 +104,16 @@ TEST_P(CodecDamage, forged_parts_with_fitting_checksums_are_errors_or_clips) {
   EXPECT_GT(errors, 10);
 }
 
+TEST_P(CodecDamage, targets_that_cannot_be_met_are_refused) {
+  const Clip clip = slice(test::sample_clips().front(), 0, 30);
+  try {
+    static_cast<void>(encode(GetParam()->name(), std::span(&clip, 1), {.target = {.bytes = 60}}));
+    ADD_FAILURE() << "a clip in 60 bytes";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::usage) << error.what();
+  }
+}
+
 TEST_P(CodecDamage, clips_that_are_no_motion_are_refused) {
   Clip clip = slice(test::sample_clips().front(), 0, 30);
   clip.rotations[17] = std::numeric_limits<double>::quiet_NaN();
@@ -123,6 +134,66 @@ TEST_P(CodecDamage, clips_of_one_frame_and_of_ten_are_clips) {
     EXPECT_EQ(decoded.name, clip.name);
     EXPECT_LT(clip_error(clip, decoded, 0, frames, 0).mean_cm(), 5) << frames;
   }
+}
+
+TEST_P(CodecDamage, targets_are_met_on_the_decoded_clips) {
+  std::vector<Clip> clips;
+  for (std::size_t c = 0; c < 3; ++c) clips.push_back(slice(test::sample_clips()[c], 0, 60));
+  const Bytes plain = encode(GetParam()->name(), clips, {.target = {.mean_error_cm = 1}});
+  for (const CodecTarget& target : {CodecTarget{.mean_error_cm = 1.5}, CodecTarget{.max_error_cm = 4},
+                                    CodecTarget{.bytes = static_cast<std::int64_t>(plain.size() * 11 / 10)}}) {
+    const Bytes bytes = encode(GetParam()->name(), clips, {.target = target});
+    const std::vector<Clip> decoded = open_stream(bytes, "s")->decode_all();
+    ClipErrorSums error;
+    for (std::size_t c = 0; c < clips.size(); ++c) error.add(clip_error(clips[c], decoded[c], 0, clips[c].frames, 0));
+    if (target.mean_error_cm) {
+      EXPECT_LE(error.mean_cm(), *target.mean_error_cm);
+    }
+    if (target.max_error_cm) {
+      EXPECT_LE(error.largest, *target.max_error_cm);
+    }
+    if (target.bytes) {
+      EXPECT_LE(static_cast<std::int64_t>(bytes.size()), *target.bytes);
+    }
+    EXPECT_NEAR(open_stream(bytes, "s")->stream().error().mean_joint_error_cm, error.mean_cm(), 1e-4);
+  }
+}
+
+// A hip, a trunk and an arm that swing on and on, never twice alike.
+Clip long_clip(int frames) {
+  Skeleton skeleton;
+  const std::vector<Channel> turns{Channel::z_rotation, Channel::x_rotation, Channel::y_rotation};
+  std::vector<Channel> root{Channel::x_position, Channel::y_position, Channel::z_position};
+  root.insert(root.end(), turns.begin(), turns.end());
+  skeleton.joints = {{.name = "Hips", .parent = -1, .offset = {0, 90, 0}, .channels = root},
+                     {.name = "Spine", .parent = 0, .offset = {0, 40, 0}, .channels = turns},
+                     {.name = "Arm", .parent = 1, .offset = {20, 0, 0}, .channels = turns, .end_site = {{30, 0, 0}}}};
+  Clip clip = make_clip("long", skeleton, 120, frames);
+  auto& travel = clip.require_translation_track(0).values;
+  for (int f = 0; f < frames; ++f) {
+    const double t = f / 120.0;
+    travel[static_cast<std::size_t>(f)] = {300 * std::sin(0.05 * t), 90 + 2 * std::sin(7 * t),
+                                           200 * std::cos(0.03 * t)};
+    for (int j = 0; j < 3; ++j) {
+      const double angle = (0.2 + 0.2 * j) * std::sin((1.3 + 0.4 * j + 0.001 * t) * t) + 0.1 * std::sin(0.7 * t);
+      clip.set_rotation(j, f,
+                        Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 0.3 * j, 0.2).normalized())));
+    }
+  }
+  return clip;
+}
+
+TEST_P(CodecDamage, a_clip_of_a_hundred_thousand_frames_comes_back_whole_and_in_parts) {
+  const Clip clip = long_clip(100'000);
+  const Bytes bytes = encode(GetParam()->name(), std::span(&clip, 1));
+  EXPECT_LT(bytes.size(), clip.rotations.size() * sizeof(float));
+  const auto reader = open_stream(bytes, "s");
+  const Clip decoded = reader->decode(0);
+  ASSERT_EQ(decoded.frames, clip.frames);
+  const ClipErrorSums error = clip_error(clip, decoded, 0, clip.frames, 0);
+  EXPECT_LE(error.mean_cm(), reader->stream().error().mean_joint_error_cm * (1 + 1e-6));
+  const Clip part = reader->decode(0, 77'000, 50, -1);
+  EXPECT_EQ(part.rotation(2, 49).coeffs(), decoded.rotation(2, 77'049).coeffs());
 }
 
 INSTANTIATE_TEST_SUITE_P(Codecs, CodecDamage, testing::ValuesIn(all_codecs().begin(), all_codecs().end()),
