@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <queue>
 #include <tuple>
 #include <unordered_set>
@@ -18,6 +19,9 @@ namespace {
 
 // Distances that a standard deviation is taken of: at most this many, evenly spread, of a longer interval.
 constexpr int samples = 24;
+
+// Candidates that are looked at again before the best of them is taken.
+constexpr int looks = 32;
 
 struct Spread {
   double sum = 0, squares = 0;
@@ -83,23 +87,7 @@ class Chooser {
       if (is_new(candidates[c])) push(candidates[c], gains[c]);
     }
     std::vector<PrimaryChoice> out;
-    while (!queue_.empty()) {
-      const Entry top = queue_.top();
-      queue_.pop();
-      if (!is_free(top.interval)) {
-        for (const PixelInterval& rest : free_parts(top.interval)) {
-          if (is_new(rest)) push(rest, evaluate(rest).gain);
-        }
-        continue;
-      }
-      const Evaluation now = evaluate(top.interval);
-      if (now.gain < options_.least_gain) continue;
-      if (!queue_.empty() && now.gain < queue_.top().gain) {
-        push(top.interval, now.gain);
-        continue;
-      }
-      out.push_back(take(top.interval, now));
-    }
+    while (const auto best = best_candidate()) out.push_back(take(*best, evaluate(*best)));
     return out;
   }
 
@@ -113,6 +101,34 @@ class Chooser {
              std::tuple(other.gain, other.interval.last - other.interval.first, -other.interval.first);
     }
   };
+
+  // The free candidate of the largest gain. Gains in the queue date from when a candidate was last looked at, and they
+  // fall as clips are taken: candidates are looked at again from the top until one stays there, or until the best of
+  // `looks` of them stands for all.
+  std::optional<PixelInterval> best_candidate() {
+    Entry best;
+    for (int look = 0; look < looks && !queue_.empty();) {
+      const Entry top = queue_.top();
+      queue_.pop();
+      if (!is_free(top.interval)) {
+        push_rest(top.interval);
+        continue;
+      }
+      const Entry now{evaluate(top.interval).gain, top.interval};
+      if (now.gain < options_.least_gain) continue;
+      if (queue_.empty() || now.gain >= queue_.top().gain) return now.interval;
+      queue_.push(now);
+      best = std::max(best, now);
+      ++look;
+    }
+    if (best.gain < options_.least_gain) return std::nullopt;
+    return best.interval;
+  }
+  void push_rest(const PixelInterval& interval) {
+    for (const PixelInterval& rest : free_parts(interval)) {
+      if (is_new(rest)) push(rest, evaluate(rest).gain);
+    }
+  }
 
   [[nodiscard]] int longest_pixels() const {
     return std::max(shortest_, static_cast<int>(std::lround(options_.longest_s * table_.pixel_rate_hz())));

@@ -1,5 +1,7 @@
 // The choice of primary, repeated and unique clips, and the analysis as a whole.
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include <gmock/gmock.h>
@@ -7,14 +9,18 @@
 #include <tbb/global_control.h>
 
 #include "base/error.h"
+#include "codecs/rma/markers.h"
 #include "codecs/rma/repeats.h"
+#include "motion/read.h"
 #include "tests/codecs/rma_tables.h"
+#include "tests/support/data.h"
 
 namespace kinespace {
 namespace {
 
 using test::add_clip;
 using test::Cycle;
+using test::data_folder;
 using test::empty_table;
 using Kind = RepeatClip::Kind;
 
@@ -251,6 +257,46 @@ TEST(rma_repeats, numbers_that_are_none_and_options_out_of_range_are_errors) {
   EXPECT_EQ(kind_of({.segmentation = {.window_s = std::numeric_limits<double>::quiet_NaN()}}), ErrorKind::usage);
   table.values[77] = std::numeric_limits<float>::infinity();
   EXPECT_EQ(kind_of({}), ErrorKind::bad_input);
+}
+
+FrameTable markers_of(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (is_motion_file(entry.path())) files.push_back(entry.path());
+  }
+  std::ranges::sort(files);
+  std::vector<Clip> clips;
+  for (const auto& file : files) clips.push_back(read_clip(file));
+  return marker_table(clips);
+}
+
+// How much of the recordings the paper's rules find again (its own: 67 % of cmu, other clips), and how near.
+void expect_repeats(const std::filesystem::path& folder, double least_share) {
+  const FrameTable table = markers_of(folder);
+  const RepeatAnalysis analysis = analyse_repeats(table);
+  expect_sound(analysis, table);
+  EXPECT_GT(analysis.share(Kind::repeated), least_share);
+  EXPECT_LT(analysis.share(Kind::repeated), 0.9);
+  double squares = 0;
+  std::int64_t frames = 0;
+  for (const RepeatClip& clip : analysis.clips) {
+    squares +=
+        2 * analysis.spaces[static_cast<std::size_t>(clip.group)].total_variance * static_cast<double>(clip.frames());
+    frames += clip.frames();
+  }
+  // Two frames of a group drawn by chance are this far apart.
+  const double typical = std::sqrt(squares / static_cast<double>(frames));
+  EXPECT_LT(reference_distance(analysis, table), 0.4 * typical);
+}
+
+TEST(rma_repeats, walks_and_jumps_of_cmu_are_found_again) {
+  KINESPACE_REQUIRE_FOLDER(data, data_folder);
+  expect_repeats(data / "cmu" / "02", 0.4);
+}
+
+TEST(rma_repeats, climbing_of_cmu_is_found_again) {
+  KINESPACE_REQUIRE_FOLDER(data, data_folder);
+  expect_repeats(data / "cmu" / "01", 0.5);
 }
 
 }  // namespace
