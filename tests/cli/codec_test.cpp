@@ -29,7 +29,7 @@ class CodecCommands : public ::testing::Test {
     write_text(*folder_ / "other.bvh", walking_bvh(200, 1));
   }
   static void TearDownTestSuite() { folder_.reset(); }
-  static std::string at(const std::string& name) { return (*folder_ / name).string(); }
+  static std::string at(const std::string& name) { return (*folder_ / name.c_str()).string(); }
   static std::string clip(const std::string& name) { return at("clips/" + name + ".bvh"); }
 
   static json run(const std::vector<std::string>& arguments) {

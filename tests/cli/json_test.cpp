@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "bench/plot.h"
 #include "bench/report.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -127,6 +128,41 @@ TEST_F(JsonOutput, bench_report_has_its_keys_and_null_for_no_bar) {
   const std::string table = to_markdown(report);
   EXPECT_THAT(table, HasSubstr("| speed | x | 140 | MB/s | >= 150 | **no** |"));
   EXPECT_THAT(table, HasSubstr("| size \\| whole | y | 3.5 | MB |  |  |"));
+}
+
+TEST_F(JsonOutput, tables_of_a_bench_are_lists_of_rows_and_their_empty_cells_null) {
+  const BenchReport report{
+      .bench = "codecs",
+      .device = "cpu",
+      .threads = 2,
+      .tables = {{.title = "Table 4", .columns = {"clip", "ratio"}, .rows = {{"walk | slow", 59.4}, {"run", {}}}}}};
+  const nlohmann::json table = nlohmann::json::parse(to_json(report)).at("tables").at(0);
+  EXPECT_EQ(table.at("title"), "Table 4");
+  EXPECT_EQ(table.at("columns"), nlohmann::json({"clip", "ratio"}));
+  EXPECT_EQ(table.at("rows").at(0), nlohmann::json({"walk | slow", 59.4}));
+  EXPECT_TRUE(table.at("rows").at(1).at(1).is_null());
+  EXPECT_THAT(to_markdown(report), HasSubstr("| walk \\| slow | 59.4 |\n| run |  |"));
+  EXPECT_EQ(to_text(report.tables.front()),
+            "Table 4\n  clip         ratio\n  walk | slow   59.4\n  run               \n");
+}
+
+TEST_F(JsonOutput, a_plot_shows_what_its_axes_can_show) {
+  const Plot plot{.title = "errors & bytes",
+                  .x = {.label = "error", .logarithmic = true},
+                  .y = {.label = "bytes"},
+                  .series = {{"ours", {{0.1, 5}, {1, 3}, {0, 9}}}, {"nobody's", {}}}};
+  const std::string svg = to_svg(plot);
+  EXPECT_THAT(svg, HasSubstr("errors &amp; bytes"));
+  EXPECT_THAT(svg, HasSubstr("nobody's"));
+  const auto circles = [](const std::string& text) {
+    std::size_t out = 0;
+    for (std::size_t at = text.find("<circle"); at != std::string::npos; at = text.find("<circle", at + 1)) ++out;
+    return out;
+  };
+  EXPECT_EQ(circles(svg), 2U) << "zero has no place on a logarithmic axis";
+  EXPECT_EQ(svg, to_svg(plot));
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(to_svg({}).find("nan"), std::string::npos) << "an empty plot is one too";
 }
 
 TEST_F(JsonOutput, what_is_no_number_or_no_text_is_still_valid_json) {
