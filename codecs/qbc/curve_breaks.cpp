@@ -1,6 +1,7 @@
 // The choice of breaks.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "codecs/qbc/banded_system.h"
 #include "codecs/qbc/curve_choice.h"
@@ -36,14 +37,18 @@ class BreakSearch {
   BreakSearch(const CurveTask& task, const std::vector<int>& start)
       : task_(task),
         n_(static_cast<std::size_t>(task.dimensions)),
+        running_(task),
         next_(static_cast<std::size_t>(task.frames), -1),
         previous_(next_),
         sums_(next_.size()),
         end_(next_.size()),
-        middle_(next_.size()) {
+        middle_(next_.size()),
+        changed_(next_.size(), 0),
+        moved_(next_.size(), -1),
+        filled_(next_.size(), -1) {
     for (std::size_t b = 0; b + 1 < start.size(); ++b) {
       link(start[b], start[b + 1]);
-      sums_[index(start[b])] = segment_sums(task, start[b], start[b + 1]);
+      sums_[index(start[b])] = running_.segment(start[b], start[b + 1]);
     }
     for (const int b : start) std::copy_n(task.at(b), n_, end_[index(b)].begin());
     for (std::size_t b = 0; b + 1 < start.size(); ++b) {
@@ -97,7 +102,7 @@ class BreakSearch {
     for (int i = 0, last = right; i < around && next_[index(last)] >= 0; ++i) add(last = next_[index(last)]);
     for (int s = 0; s < out.segments; ++s) {
       const int a = out.at[static_cast<std::size_t>(s)], b = out.at[static_cast<std::size_t>(s) + 1];
-      out.sums[static_cast<std::size_t>(s)] = next_[index(a)] == b ? sums_[index(a)] : segment_sums(task_, a, b);
+      out.sums[static_cast<std::size_t>(s)] = next_[index(a)] == b ? sums_[index(a)] : running_.segment(a, b);
     }
     const int last = out.at[static_cast<std::size_t>(out.segments)];
     out.free_first = first == 0;
@@ -237,6 +242,21 @@ class BreakSearch {
     }
   }
 
+  // Whether breaks of the window around [left, right] have changed since a change there was last tried.
+  [[nodiscard]] bool stale(int left, int right, int tried) const {
+    for (int i = 0, b = left; i <= around && b >= 0; ++i, b = previous_[index(b)]) {
+      if (changed_[index(b)] > tried) return true;
+    }
+    for (int i = 0, b = right; i <= around && b >= 0; ++i, b = next_[index(b)]) {
+      if (changed_[index(b)] > tried) return true;
+    }
+    return tried < 0;
+  }
+  void mark(int left, int right) {
+    ++now_;
+    for (int b = left; b >= 0 && b <= right; b = next_[index(b)]) changed_[index(b)] = now_;
+  }
+
   // Breaks away, or elsewhere.
   bool move_all() {
     bool changed = false;
@@ -249,6 +269,7 @@ class BreakSearch {
   }
   bool move(int b) {
     const int left = previous_[index(b)], right = next_[index(b)];
+    if (!stale(left, right, std::exchange(moved_[index(b)], now_))) return false;
     Window best = window(left, right, std::array{b}, 1);
     best.cost = full_cost(best, 1e300);
     int removed = -1;
@@ -265,6 +286,7 @@ class BreakSearch {
       if (to > left && to < right) consider(window(left, right, std::array{to}, 1));
     }
     apply(best, removed);
+    if (removed >= 0) mark(left, right);
     return removed >= 0;
   }
 
@@ -276,6 +298,7 @@ class BreakSearch {
     return changed;
   }
   bool insert(int left, int right) {
+    if (!stale(left, right, std::exchange(filled_[index(left)], now_))) return false;
     Window best = window(left, right, std::array{left}, 0);
     best.cost = full_cost(best, 1e300);
     int segment = 0;
@@ -293,15 +316,19 @@ class BreakSearch {
       changed = true;
     }
     apply(best, -1);
+    if (changed) mark(left, right);
     return changed;
   }
 
   const CurveTask& task_;
   std::size_t n_;
+  RunningSums running_;
   std::vector<int> next_, previous_;  // by break frame; -1: none, or no break
   std::vector<SegmentSums> sums_;     // by first frame
   std::vector<Point> end_;
   std::vector<Point> middle_;
+  std::vector<int> changed_, moved_, filled_;  // by break frame: when it was, and when that was last tried
+  int now_ = 0;
 };
 
 std::vector<double> by_dimension(const CurveTask& task) {
@@ -340,9 +367,11 @@ std::vector<int> break_and_fit(const CurveTask& task) {
 }
 
 std::vector<int> choose_breaks(const CurveTask& task) {
-  const std::vector<int> start = break_and_fit(task);
-  if (task.frames < 3) return start;
-  return BreakSearch(task, start).search();
+  return choose_breaks(task, break_and_fit(task));
+}
+
+std::vector<int> choose_breaks(const CurveTask& task, const std::vector<int>& start) {
+  return task.frames < 3 ? start : BreakSearch(task, start).search();
 }
 
 }  // namespace kinespace

@@ -18,7 +18,8 @@ class NumberChoice {
         predictor_(shape_),
         context_(task.dimensions) {
     out_.breaks = breaks;
-    for (std::size_t s = 0; s + 1 < breaks.size(); ++s) sums_.push_back(segment_sums(task, breaks[s], breaks[s + 1]));
+    const RunningSums running(task);
+    for (std::size_t s = 0; s + 1 < breaks.size(); ++s) sums_.push_back(running.segment(breaks[s], breaks[s + 1]));
   }
 
   CurveNumbers choose() {
@@ -270,8 +271,9 @@ CurveChoice choose_curve(const CurveTask& task, bool paper) {
     return choice.error.sum + task.rate_weight * 8 * static_cast<double>(choice.code.size());
   };
   const auto consider = [&](CurveTask other) {
+    const bool near = other.grid == best.task.grid;
     if (other.step_index == best.task.step_index && other.grid == best.task.grid) return false;
-    CurveChoice choice = code_with(other, choose_breaks(other));
+    CurveChoice choice = code_with(other, near ? choose_breaks(other, best.numbers.breaks) : choose_breaks(other));
     if (choice.error.largest > task.limit || cost(choice) >= cost(best)) return false;
     best = std::move(choice);
     return true;

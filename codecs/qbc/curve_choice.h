@@ -24,6 +24,8 @@ namespace kinespace {
 
 // Ascending, with all common breaks.
 [[nodiscard]] std::vector<int> choose_breaks(const CurveTask& task);
+// The same from breaks that are near; they stand on the task's grid.
+[[nodiscard]] std::vector<int> choose_breaks(const CurveTask& task, const std::vector<int>& start);
 // The paper's: break-and-fit (codecs/quadratic_bezier.h).
 [[nodiscard]] std::vector<int> break_and_fit(const CurveTask& task);
 

@@ -44,7 +44,21 @@ struct SegmentSums {
   Point r0{}, r1{}, r2{};
   double square = 0;
 };
-[[nodiscard]] SegmentSums segment_sums(const CurveTask& task, int first, int last);
+// Of any segment that crosses no common break, from running sums of frames times 1, t, t^2.
+class RunningSums {
+ public:
+  explicit RunningSums(const CurveTask& task);
+  [[nodiscard]] SegmentSums segment(int first, int last) const;
+
+ private:
+  struct Sums {
+    Point one{}, linear{}, quadratic{};
+    double square = 0;
+  };
+  int interval_;
+  std::size_t n_;
+  std::vector<Sums> sums_;  // by frame, from the frame behind the last common break on
+};
 
 // The same with the best middle: a form in the ends alone.
 struct ReducedGram {
