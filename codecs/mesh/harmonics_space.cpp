@@ -1,0 +1,133 @@
+#include "codecs/mesh/harmonics_space.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+#include "codecs/range_coder.h"
+#include "mesh/deformation.h"
+#include "mesh/smooth_basis.h"
+
+namespace kinespace {
+namespace {
+
+constexpr std::size_t near_anchors = 4;  // of each kind: before and after
+
+struct Distance {
+  double squared;
+  std::int32_t node;
+  friend bool operator<(const Distance& a, const Distance& b) {
+    return a.squared < b.squared || (a.squared == b.squared && a.node < b.node);
+  }
+};
+
+void append_nearest(std::vector<Distance>& all, std::vector<std::int32_t>& out) {
+  const std::size_t count = std::min(near_anchors, all.size());
+  std::partial_sort(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(count), all.end());
+  for (std::size_t i = 0; i < count; ++i) out.push_back(all[i].node);
+}
+
+// Functions whose anchors lie near each other; the constants have no neighbours.
+NodeGraph graph_of_functions(const Points& key, const SmoothBasis& basis) {
+  NodeGraph out;
+  const int constants = basis.count() - static_cast<int>(basis.anchors.size());
+  out.first.push_back(0);
+  const auto place = [&](int k) { return basis.anchors[static_cast<std::size_t>(k - constants)]; };
+  for (int k = 0; k < basis.count(); ++k) {
+    if (k >= constants) {
+      std::vector<Distance> before, after;
+      for (int m = constants; m < basis.count(); ++m) {
+        if (m == k) continue;
+        double squared = 0;
+        for (int d = 0; d < 3; ++d) {
+          const double off = key(place(m), d) - key(place(k), d);
+          squared += off * off;
+        }
+        (m < k ? before : after).push_back({squared, m});
+      }
+      append_nearest(before, out.near);
+      append_nearest(after, out.near);
+    }
+    out.first.push_back(static_cast<std::int32_t>(out.near.size()));
+    out.band.push_back(static_cast<std::uint8_t>(std::min(bit_length(static_cast<std::uint64_t>(k)), 14)));
+  }
+  return out;
+}
+
+NodeGraph graph_of_vertices(const Neighbours& neighbours) {
+  NodeGraph out;
+  out.first.push_back(0);
+  for (int v = 0; v < neighbours.vertices(); ++v) {
+    const auto near = neighbours.of(v);
+    out.near.insert(out.near.end(), near.begin(), near.end());
+    out.first.push_back(static_cast<std::int32_t>(out.near.size()));
+    out.band.push_back(0);
+  }
+  return out;
+}
+
+}  // namespace
+
+struct HarmonicsSpace::Basis {
+  SmoothBasis functions;
+};
+
+HarmonicsSpace::HarmonicsSpace(Points key, std::span<const Triangle> triangles, int functions)
+    : HarmonicsSpace(key, triangles, Basis{smooth_basis(key, triangles, {.functions = functions})}) {}
+
+HarmonicsSpace::HarmonicsSpace(Points key, std::span<const Triangle> triangles, const Basis& basis)
+    : projection_(basis.functions.functions),
+      neighbours_(static_cast<int>(key.rows()), triangles),
+      key_coefficients_(projection_.coefficients(key)),
+      key_low_(projection_.synthesise(key_coefficients_)),
+      detail_(key - key_low_),
+      function_graph_(graph_of_functions(key, basis.functions)),
+      vertex_graph_(graph_of_vertices(neighbours_)) {}
+
+std::vector<Eigen::Matrix3d> HarmonicsSpace::rotations(const Points& low, bool rotate) const {
+  if (!rotate) return {};
+  return ring_rotations(neighbours_, key_low_, low);
+}
+
+Points HarmonicsSpace::frame(const Coefficients& c, bool rotate, std::span<const double> residual) const {
+  const Points low = projection_.synthesise(c);
+  const auto turns = rotations(low, rotate);
+  Points d = detail_;
+  for (Eigen::Index v = 0; v < d.rows(); ++v) {
+    Eigen::Vector3d at = d.row(v).transpose();
+    if (!residual.empty()) {
+      for (int a = 0; a < 3; ++a) at[a] += residual[static_cast<std::size_t>(3 * v + a)];
+    }
+    if (rotate) {
+      const Eigen::Matrix3d& r = turns[static_cast<std::size_t>(v)];
+      for (int a = 0; a < 3; ++a) d(v, a) = r(a, 0) * at[0] + r(a, 1) * at[1] + r(a, 2) * at[2];
+    } else {
+      d.row(v) = at.transpose();
+    }
+  }
+  Coefficients back = projection_.correlations(d);
+  back = -back;
+  Points x = low + d;
+  projection_.add(back, x);
+  return x;
+}
+
+void HarmonicsSpace::residual(const Points& wanted, const Coefficients& c, bool rotate, std::span<double> out) const {
+  const Points low = projection_.synthesise(c);
+  const auto turns = rotations(low, rotate);
+  Points rest = wanted;
+  for (Eigen::Index v = 0; v < rest.rows(); ++v) {
+    const Eigen::Vector3d detail = detail_.row(v).transpose();
+    rest.row(v) -= (rotate ? Eigen::Vector3d(turns[static_cast<std::size_t>(v)] * detail) : detail).transpose();
+  }
+  Coefficients inside = projection_.correlations(rest);
+  inside = -inside;
+  projection_.add(inside, rest);
+  for (Eigen::Index v = 0; v < rest.rows(); ++v) {
+    const Eigen::Vector3d at = rest.row(v).transpose();
+    const Eigen::Vector3d back = rotate ? Eigen::Vector3d(turns[static_cast<std::size_t>(v)].transpose() * at) : at;
+    for (int a = 0; a < 3; ++a) out[static_cast<std::size_t>(3 * v + a)] = back[a];
+  }
+}
+
+}  // namespace kinespace

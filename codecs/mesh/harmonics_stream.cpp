@@ -1,0 +1,122 @@
+#include "codecs/mesh/harmonics_stream.h"
+
+#include <utility>
+
+#include "base/error.h"
+#include "codecs/integer_model.h"
+
+namespace kinespace {
+namespace {
+
+KeyMesh flat_mesh(int vertices, std::vector<Triangle> triangles) {
+  KeyMesh out{.vertices = vertices, .triangles = std::move(triangles), .keys = {}};
+  out.keys.emplace_back(static_cast<std::size_t>(vertices));
+  return out;
+}
+
+}  // namespace
+
+int FrameBlocks::of(int frame) const {
+  int block = static_cast<int>(std::int64_t{frame} * count() / frames);
+  while (first(block) > frame) --block;
+  while (first(block + 1) <= frame) ++block;
+  return block;
+}
+
+void put_setup(ByteWriter& out, const HarmonicsSetup& setup) {
+  put_layout(out, setup.layout);
+  put_grid(out, setup.grid);
+  out.put(setup.size);
+  out.put(setup.step);
+  put_varint(out, static_cast<std::uint64_t>(setup.functions));
+  out.put(static_cast<std::uint8_t>(setup.rotate ? 1 : 0));
+  put_varint(out, static_cast<std::uint64_t>(setup.coarse_vertices));
+  if (setup.coarse_vertices > 0) put_varint(out, static_cast<std::uint64_t>(setup.coarse_triangles));
+}
+
+HarmonicsSetup get_setup(std::span<const std::byte> bytes, std::uint64_t stream_bytes, const std::string& source) {
+  ByteReader in(bytes, source);
+  HarmonicsSetup out;
+  out.layout = get_layout(in, stream_bytes);
+  out.grid = get_grid(in);
+  out.size = get_number(in, 0, 1e13);
+  out.step = get_number(in, 1e-300, 1e13);
+  const std::uint64_t functions = get_varint(in);
+  const auto rotate = in.get<std::uint8_t>();
+  const std::uint64_t coarse = get_varint(in);
+  const bool decimated = coarse > 0;
+  const std::uint64_t coded = decimated ? coarse : static_cast<std::uint64_t>(out.layout.vertices);
+  const std::uint64_t triangles = decimated ? get_varint(in) : 0;
+  if (rotate > 1 || functions < 1 || coded > static_cast<std::uint64_t>(out.layout.vertices) || functions > coded ||
+      functions * coded > static_cast<std::uint64_t>(most_numbers(stream_bytes)) ||
+      triangles > static_cast<std::uint64_t>(out.layout.triangles)) {
+    in.fail(std::to_string(functions) + " functions on " + std::to_string(coded) + " vertices",
+            "what the encoder writes (damaged)");
+  }
+  in.expect_end();
+  out.functions = static_cast<int>(functions);
+  out.rotate = rotate == 1;
+  out.coarse_vertices = static_cast<int>(coarse);
+  out.coarse_triangles = static_cast<std::int64_t>(triangles);
+  return out;
+}
+
+void add_decimation(BitstreamWriter& out, const Decimation& decimation) {
+  IntegerWriter kept;
+  std::int32_t next = 0;
+  std::int64_t gap = 0;
+  for (const std::int32_t v : decimation.kept) {
+    const int context = static_cast<int>(std::min<std::int64_t>(gap, 4));
+    gap = v - next;
+    kept.put(gap, context);
+    next = v + 1;
+  }
+  const auto packed = pack_key_mesh(flat_mesh(static_cast<int>(decimation.kept.size()), decimation.triangles));
+  out.add_section("coarse", std::move(kept).finish());
+  out.add_section("coarse.surface", packed.surface);
+  out.add_section("coarse.order", packed.order);
+}
+
+Decimation read_decimation(const Bitstream& stream, const HarmonicsSetup& setup) {
+  Decimation out;
+  IntegerReader in(stream.section("coarse"), stream.source());
+  std::int64_t next = 0, gap = 0;
+  for (int v = 0; v < setup.coarse_vertices; ++v) {
+    gap = in.get_between(0, setup.layout.vertices - 1 - next, static_cast<int>(std::min<std::int64_t>(gap, 4)));
+    out.kept.push_back(static_cast<std::int32_t>(next + gap));
+    next += gap + 1;
+  }
+  in.expect_end();
+  out.triangles = unpack_key_mesh(stream.section("coarse.surface"), stream.section("coarse.order"),
+                                  setup.coarse_vertices, setup.coarse_triangles, 1, stream.source())
+                      .triangles;
+  return out;
+}
+
+Coefficients coefficients_of(const Coefficients& key, const MovingPart& motion, int frame) {
+  std::vector<double> moved(static_cast<std::size_t>(motion.nodes) * 3);
+  motion.add(frame, moved);
+  Coefficients out = key;
+  for (int k = 0; k < motion.nodes; ++k) {
+    for (int d = 0; d < 3; ++d) out(k, d) += moved[static_cast<std::size_t>(3 * k + d)];
+  }
+  return out;
+}
+
+Points HarmonicsFrames::frame(int f) const {
+  const FrameBlocks split{static_cast<int>(track.steps.size())};
+  const int b = split.of(f);
+  const Block& block = blocks[static_cast<std::size_t>(b)];
+  const int at = f - split.first(b);
+  const Coefficients c = coefficients_of(space_->key_coefficients(), block.motion, at);
+  std::vector<double> residual;
+  if (block.detail.functions.cols() > 0) {
+    residual.resize(static_cast<std::size_t>(block.detail.nodes) * 3);
+    block.detail.add(at, residual);
+  }
+  Points x = space_->frame(c, rotate_, residual);
+  if (refinement_) x = refinement_->apply(x);
+  return track.motion(static_cast<std::size_t>(f)).apply(x);
+}
+
+}  // namespace kinespace

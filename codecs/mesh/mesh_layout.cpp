@@ -1,0 +1,122 @@
+#include "codecs/mesh/mesh_layout.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+
+namespace kinespace {
+namespace {
+
+constexpr double most_steps = 1 << 28;
+
+std::int64_t get_limited(ByteReader& in, std::int64_t least, std::int64_t most, const char* what) {
+  const std::uint64_t value = get_varint(in);
+  if (value < static_cast<std::uint64_t>(least) || value > static_cast<std::uint64_t>(most)) {
+    in.fail(std::to_string(value) + " " + what, std::to_string(least) + " to " + std::to_string(most) + " (damaged)");
+  }
+  return static_cast<std::int64_t>(value);
+}
+
+}  // namespace
+
+std::int64_t most_numbers(std::uint64_t stream_bytes) {
+  return (std::int64_t{1} << 21) + 1024 * static_cast<std::int64_t>(std::min<std::uint64_t>(stream_bytes, 1U << 20U));
+}
+
+MeshLayout layout_of(const MeshSequence& mesh) {
+  return {.name = mesh.name,
+          .rate_hz = mesh.rate_hz,
+          .vertices = mesh.vertices,
+          .frames = mesh.frames,
+          .triangles = static_cast<std::int64_t>(mesh.triangles.size())};
+}
+
+void put_layout(ByteWriter& out, const MeshLayout& layout) {
+  put_short_string(out, layout.name);
+  out.put(layout.rate_hz);
+  put_varint(out, static_cast<std::uint64_t>(layout.vertices));
+  put_varint(out, static_cast<std::uint64_t>(layout.frames));
+  put_varint(out, static_cast<std::uint64_t>(layout.triangles));
+}
+
+MeshLayout get_layout(ByteReader& in, std::uint64_t stream_bytes) {
+  const auto bytes = static_cast<std::int64_t>(std::min<std::uint64_t>(stream_bytes, std::uint64_t{1} << 40));
+  MeshLayout out;
+  out.name = get_short_string(in);
+  out.rate_hz = get_number(in, 1e-9, 1e12);
+  out.vertices = static_cast<int>(get_limited(in, 1, std::min(most_vertices, 65536 + 64 * bytes), "vertices"));
+  out.frames = static_cast<int>(get_limited(in, 1, 1 << 20, "frames"));
+  out.triangles = get_limited(in, 0, 131072 + 128 * bytes, "triangles");
+  if (std::int64_t{out.vertices} * out.frames > std::int64_t{1} << 33) {
+    in.fail(std::to_string(out.vertices) + " vertices in " + std::to_string(out.frames) + " frames", "fewer (damaged)");
+  }
+  return out;
+}
+
+MeshSequence empty_sequence(const MeshLayout& layout, std::vector<Triangle> triangles) {
+  MeshSequence out;
+  out.name = layout.name;
+  out.rate_hz = layout.rate_hz;
+  out.vertices = layout.vertices;
+  out.frames = layout.frames;
+  out.triangles = std::move(triangles);
+  return out;
+}
+
+Points Grid::points(std::span<const GridPoint> q) const {
+  Points out(static_cast<Eigen::Index>(q.size()), 3);
+  for (std::size_t v = 0; v < q.size(); ++v) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      out(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(d)) = origin[d] + step * static_cast<double>(q[v][d]);
+    }
+  }
+  return out;
+}
+
+std::vector<GridPoint> Grid::quantised(const Points& x) const {
+  std::vector<GridPoint> out(static_cast<std::size_t>(x.rows()));
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    for (std::size_t d = 0; d < 3; ++d) {
+      const double at = (x(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(d)) - origin[d]) / step;
+      if (!(std::abs(at) < most_steps)) {
+        throw Error(ErrorKind::usage, {.found = "an error so small that positions need more than 28 bits",
+                                       .expected = "what 32-bit floats can hold",
+                                       .remedy = "ask for less precision"});
+      }
+      out[v][d] = static_cast<std::int32_t>(std::lround(at));
+    }
+  }
+  return out;
+}
+
+Grid grid_for(const Points& x, double step) {
+  Grid out;
+  out.step = step;
+  for (std::size_t d = 0; d < 3; ++d) {
+    double least = x(0, static_cast<Eigen::Index>(d));
+    for (Eigen::Index v = 1; v < x.rows(); ++v) least = std::min(least, x(v, static_cast<Eigen::Index>(d)));
+    out.origin[d] = least;
+  }
+  return out;
+}
+
+void put_grid(ByteWriter& out, const Grid& grid) {
+  for (const double x : grid.origin) out.put(x);
+  out.put(grid.step);
+}
+
+Grid get_grid(ByteReader& in) {
+  Grid out;
+  for (double& x : out.origin) x = get_number(in, -1e13, 1e13);
+  out.step = get_number(in, 1e-300, 1e13);
+  return out;
+}
+
+double get_number(ByteReader& in, double least, double most) {
+  const auto value = in.get<double>();
+  if (!(value >= least && value <= most)) in.fail("a number out of range", "one that the encoder writes (damaged)");
+  return value;
+}
+
+}  // namespace kinespace
