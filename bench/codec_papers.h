@@ -25,8 +25,9 @@ void add_sweep(const ClipSweep& sweep, BenchReport& report);
 // (the limit of the squared distance over ratio and over error); and whether qbc is ahead at every point of its sweep.
 void add_khan2014(std::span<const ClipSweep> sweeps, BenchReport& report);
 
-// yoo2019: table 6 is `bench fpca`'s; table 7 and 8 (ratio and distortion rate of motion vectors, 6 functions), figure
-// 9 (ratio by number of functions, ours, Fourier's and Legendre's for the same error), on a library of the folders.
+// yoo2019: table 6 (functions for an error), table 7 and 8 (ratio and distortion rate of motion vectors, 6 functions),
+// figure 9 (ratio by number of functions, ours, Fourier's and Legendre's for the same error), on a library of the
+// folders.
 void add_yoo2019(const BenchOptions& options, BenchReport& report);
 
 }  // namespace kinespace

@@ -7,6 +7,7 @@
 
 #include "bench/codec_papers.h"
 #include "bench/plot.h"
+#include "bench/space.h"
 #include <fmt/format.h>
 
 #include "fpca/analytic_basis.h"
@@ -147,6 +148,7 @@ void add_figure_9(const std::string& name, const VectorSpace& data, BenchReport&
 }  // namespace
 
 void add_yoo2019(const BenchOptions& options, BenchReport& report) {
+  basis_rows(options, report);
   const VectorSpace data = analyse(options.data / "cmu");
   add_clip_tables(data, report);
   add_figure_9("cmu 01-03", data, report);
