@@ -34,16 +34,16 @@ struct Limb {
   int joint = 0;
   std::vector<int> path;
   std::size_t most_turning = 0;
-  std::vector<double> weight;           // by frame: 0 where nothing is corrected
-  std::vector<Eigen::Vector3d> target;  // by frame
+  std::vector<double> weight;         // by frame: 0 where nothing is corrected, 1 in a contact
+  std::vector<Eigen::Vector3d> goal;  // by frame: where the joint would be in contact
 };
 
 class Solver {
  public:
-  // Turns the joints path[turning..] of one frame until the last is at the target. `turning` falls (from the limb's end
-  // upwards).
+  // Turns the joints path[turning..] of one frame until the last is at the goal, or `weight` of the way there.
+  // `turning` falls (from the limb's end upwards).
   void solve_frame(Clip& clip, int frame, const std::vector<int>& path, std::span<const std::size_t> turning,
-                   const Eigen::Vector3d& target) {
+                   const Eigen::Vector3d& goal, double weight) {
     const std::size_t n = path.size();
     local_.resize(n);
     world_.resize(n);
@@ -54,16 +54,21 @@ class Solver {
       offset_[i] = clip.translation(path[i], frame);
     }
     forward(0);
+    const Eigen::Vector3d target = at_[n - 1] + weight * (goal - at_[n - 1]);
+    best_ = local_;
+    double least = (target - at_[n - 1]).squaredNorm();
     bool moved = false;
-    for (int round = 0; round < most_rounds; ++round) {
-      const Eigen::Vector3d e = target - at_[n - 1];
-      if (!(e.squaredNorm() > near_enough_cm * near_enough_cm)) break;
-      turn_towards(e, turning);
+    for (int round = 0; round < most_rounds && least > near_enough_cm * near_enough_cm; ++round) {
+      turn_towards(target - at_[n - 1], turning);
       forward(turning.back());
+      const double left = (target - at_[n - 1]).squaredNorm();
+      if (!(left < least)) break;
+      least = left;
+      best_ = local_;
       moved = true;
     }
     for (const std::size_t i : turning) {
-      if (moved) clip.set_rotation(path[i], frame, local_[i].normalized());
+      if (moved) clip.set_rotation(path[i], frame, best_[i].normalized());
     }
   }
 
@@ -93,6 +98,7 @@ class Solver {
   }
 
   std::vector<Eigen::Quaterniond> local_;
+  std::vector<Eigen::Quaterniond> best_;
   std::vector<Eigen::Matrix3d> world_;
   std::vector<Eigen::Vector3d> at_;
   std::vector<Eigen::Vector3d> offset_;
@@ -105,7 +111,7 @@ void add_track(const Clip& clip, const ContactTrack& track, int before, int afte
   for (int i = 0; i < count; ++i) {
     const auto f = static_cast<std::size_t>(track.first + i);
     limb.weight[f] = 1;
-    limb.target[f] = track.points[static_cast<std::size_t>(i)];
+    limb.goal[f] = track.points[static_cast<std::size_t>(i)];
   }
   const int from = std::max(0, track.first - before);
   const int to = std::min(clip.frames, last + after);
@@ -113,13 +119,13 @@ void add_track(const Clip& clip, const ContactTrack& track, int before, int afte
   const auto path_after = joint_path(clip, limb.joint, last - 1, to - last + 1);
   const Eigen::Vector3d first_off = track.points.front() - path_before.back();
   const Eigen::Vector3d last_off = track.points.back() - path_after.front();
-  // Two contacts that are near fade into each other: their corrections add up.
+  // Two contacts that are near fade into each other: both corrections, by weight.
   const auto fade = [&](int frame, double u, const Eigen::Vector3d& own, const Eigen::Vector3d& off) {
     const auto f = static_cast<std::size_t>(frame);
     const double weight = u * u * (3 - 2 * u);
-    if (limb.weight[f] == 0) limb.target[f] = own;
-    limb.target[f] += weight * off;
-    limb.weight[f] += weight;
+    const double both = limb.weight[f] + weight;
+    limb.goal[f] = (limb.weight[f] * limb.goal[f] + weight * (own + off)) / both;
+    limb.weight[f] = std::min(both, 1.0);
   };
   for (int f = from; f < track.first; ++f) {
     const double u = 1 - static_cast<double>(track.first - f) / (before + 1);
@@ -148,7 +154,7 @@ std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> track
           .path = {},
           .most_turning = turning_joints,
           .weight = {},
-          .target = {},
+          .goal = {},
       };
       for (int j = track.joint; j >= 0; j = clip.skeleton.joints[static_cast<std::size_t>(j)].parent)
         limb.path.push_back(j);
@@ -157,7 +163,7 @@ std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> track
         if (std::ranges::find(limb.path, other.joint) != limb.path.end()) ++limb.most_turning;
       }
       limb.weight.assign(frames, 0.0);
-      limb.target.assign(frames, Eigen::Vector3d::Zero());
+      limb.goal.assign(frames, Eigen::Vector3d::Zero());
       out.push_back(std::move(limb));
     }
     add_track(clip, track, before, after, out.back());
@@ -167,28 +173,49 @@ std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> track
 
 }  // namespace
 
-void hold_contacts(Clip& clip, std::span<const ContactTrack> tracks, double blending_s) {
-  std::vector<Limb> limbs = limbs_of(clip, tracks, blending_s);
+namespace {
+
+// The joints of a limb's path that turn, from its end upwards: at most so many, none above joint `below`.
+void choose_turning(const Clip& clip, const Limb& limb, std::size_t most, int below, std::vector<std::size_t>& out) {
   const int root = clip.skeleton.travel_root();
+  out.clear();
+  for (std::size_t i = limb.path.size() - 1; i-- > 0 && out.size() < most;) {
+    const int joint = limb.path[i];
+    if (joint <= root || joint < below) break;
+    if (clip.skeleton.joints[static_cast<std::size_t>(joint)].has_rotation()) out.push_back(i);
+  }
+}
+
+void hold_limb(Clip& clip, const Limb& limb, std::span<const std::size_t> turning, Solver& solver) {
+  if (turning.empty()) return;
+  for (int f = 0; f < clip.frames; ++f) {
+    const auto frame = static_cast<std::size_t>(f);
+    if (limb.weight[frame] == 0) continue;
+    solver.solve_frame(clip, f, limb.path, turning, limb.goal[frame], limb.weight[frame]);
+  }
+}
+
+}  // namespace
+
+void hold_contacts(Clip& clip, std::span<const ContactTrack> tracks, double blending_s) {
+  const std::vector<Limb> limbs = limbs_of(clip, tracks, blending_s);
   Solver solver;
   std::vector<std::size_t> turning;
-  // Parents stand before children in a skeleton, and tracks are sorted by joint.
+  // Children first (a toe takes the leg along), then their parents (an ankle has its own place) ...
+  for (auto limb = limbs.rbegin(); limb != limbs.rend(); ++limb) {
+    choose_turning(clip, *limb, limb->most_turning, 0, turning);
+    hold_limb(clip, *limb, turning, solver);
+  }
+  // ... and what that took from the children, by turning about the nearest such parent.
   for (const Limb& limb : limbs) {
-    for (int f = 0; f < clip.frames; ++f) {
-      const auto frame = static_cast<std::size_t>(f);
-      if (limb.weight[frame] == 0) continue;
-      turning.clear();
-      for (std::size_t i = limb.path.size() - 1; i-- > 0 && turning.size() < limb.most_turning;) {
-        const int joint = limb.path[i];
-        if (joint <= root) break;
-        if (!clip.skeleton.joints[static_cast<std::size_t>(joint)].has_rotation()) continue;
-        turning.push_back(i);
-        const bool stands = std::ranges::any_of(
-            limbs, [&](const Limb& other) { return other.joint == joint && other.weight[frame] != 0; });
-        if (stands) break;
-      }
-      if (!turning.empty()) solver.solve_frame(clip, f, limb.path, turning, limb.target[frame]);
+    int nearest = -1;
+    for (const Limb& other : limbs) {
+      const bool above = other.joint != limb.joint && std::ranges::find(limb.path, other.joint) != limb.path.end();
+      if (above) nearest = std::max(nearest, other.joint);
     }
+    if (nearest < 0) continue;
+    choose_turning(clip, limb, limb.path.size(), nearest, turning);
+    hold_limb(clip, limb, turning, solver);
   }
 }
 

@@ -6,8 +6,9 @@
 //   w_i = r_i x y,   y = (J J' + 4 cm^2 + |e|^2)^-1 e,   J J' = sum_i |r_i|^2 - r_i r_i'      e: what is missing, cm
 //
 // w_i being the turn of joint i, at r_i from the touching joint. Two joints above it turn (knee and hip for an ankle),
-// and one more for each of its parents that has contacts of its own (the ankle for a toe); none above a parent that is
-// in contact in the same frame, so that the foot turns about a standing ankle. The root never moves.
+// and one more for each of its parents that has contacts of its own (the ankle for a toe). A toe comes first and takes
+// the leg along, then the ankle is put in its own place, then the foot turns about it to the toe's. The root never
+// moves.
 //
 // Before and after a contact its correction fades out, within the paper's 30 ms or longer. A contact out of reach is
 // come as near to as the limb can. Sums, products and square roots in a fixed order: the same bits on every machine.

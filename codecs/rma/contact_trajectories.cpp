@@ -131,12 +131,10 @@ std::vector<Eigen::Vector3d> joint_path(const Clip& clip, int joint, int first, 
 std::vector<ContactCode> code_contacts(std::span<const ContactTrack> tracks, const Clip& decoded,
                                        const ContactOptions& options) {
   std::vector<ContactCode> out;
-  constexpr double reach_cm = ContactCode::farthest_start * ContactCode::start_step_cm;
   for (const ContactTrack& track : tracks) {
     const auto path = joint_path(decoded, track.joint, track.first, static_cast<int>(track.points.size()));
-    // From where on the decoded joint is within what a start can tell.
     std::size_t start = 0;
-    while (start < path.size() && (track.points[start] - path[start]).cwiseAbs().maxCoeff() > reach_cm) ++start;
+    while (start < path.size() && (track.points[start] - path[start]).norm() > ContactCode::farthest_off_cm) ++start;
     if (path.size() - start < 2) continue;
     ContactCode code{.joint = track.joint, .first = track.first + static_cast<int>(start), .start = {}, .moves = {}};
     Eigen::Vector3d at = path[start];

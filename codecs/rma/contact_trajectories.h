@@ -49,6 +49,8 @@ struct ContactCode {
   static constexpr double start_step_cm = 0.1;
   static constexpr double move_step_cm = 2.5 / 8;
   static constexpr int farthest_start = 127;
+  // A contact begins where the decoded joint is not farther off: a limb that was pulled further would jerk.
+  static constexpr double farthest_off_cm = 6;
   static constexpr int farthest_move = 7;
 
   int joint = 0;

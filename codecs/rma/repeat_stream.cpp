@@ -10,7 +10,7 @@
 namespace kinespace {
 namespace {
 
-constexpr double smoothing_s = 0.12;  // to either side of a seam
+constexpr double smoothing_s = 0.2;  // to either side of a seam
 constexpr int prediction_context = contact_contexts;
 constexpr int jump_context = prediction_context + prediction_contexts;
 constexpr int point_context = jump_context + 1;
