@@ -30,6 +30,8 @@ struct EncodeOptions {
   CodecTarget target;
   std::optional<fs::path> basis;      // a library
   std::vector<std::string> settings;  // NAME=VALUE
+  std::string profile;                // of codec rma: paper or default
+  std::optional<double> variance;     // of codecs rma and clip-pca, percent
   bool json = false;
 };
 
@@ -95,6 +97,14 @@ double raw_bytes(const std::vector<Clip>& clips) {
   return out;
 }
 
+// The settings with --profile and --variance among them.
+std::map<std::string, double, std::less<>> all_settings(const EncodeOptions& options) {
+  auto out = parse_settings(options.settings);
+  if (!options.profile.empty()) out["profile"] = options.profile == "paper" ? 1 : 0;
+  if (options.variance) out["variance"] = *options.variance;
+  return out;
+}
+
 void run_encode(const EncodeOptions& options, Session& session) {
   const Progress progress = session.progress();
   const std::vector<Clip> clips = read_clips(input_files(options.inputs), options.output, progress);
@@ -105,7 +115,7 @@ void run_encode(const EncodeOptions& options, Session& session) {
   }
   const CodecOptions codec_options{.target = options.target,
                                    .basis = basis ? &*basis : nullptr,
-                                   .settings = parse_settings(options.settings),
+                                   .settings = all_settings(options),
                                    .progress = progress};
   const auto start = std::chrono::steady_clock::now();
   const Bytes stream = encode(options.codec, clips, codec_options);
@@ -162,6 +172,11 @@ void add_encode(CLI::App& app, Session& session) {
   command->add_option("--basis", options->basis,
                       "A library whose tables the stream may leave out: small streams of single clips, which decode "
                       "takes the library for too (motion-space)");
+  command
+      ->add_option("--profile", options->profile, "Of codec rma: the paper's rules, or what goes beyond them (default)")
+      ->check(CLI::IsMember({"default", "paper"}));
+  command->add_option("--variance", options->variance,
+                      "Percent of variance that the axes keep, without a target: rma --profile paper, clip-pca");
   command->add_option("--set", options->settings, "A setting of the codec, NAME=NUMBER; --settings lists them")
       ->allow_extra_args(false);
   command
