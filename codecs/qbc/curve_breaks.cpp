@@ -157,7 +157,7 @@ class BreakSearch {
     CurvePredictor predictor(shape_of(task_));
     const int before = previous_[index(w.at[0])];
     if (before >= 0) {
-      predictor.begin(end_[index(before)].data());
+      predictor.begin(end_[index(before)].data(), w.at[0] - before, w.at[0] - before);
       predictor.advance(w.at[0] - before, middle_[index(before)].data(), w.end[0].data());
     }
     for (int s = 0; s < w.segments; ++s) {
@@ -182,8 +182,8 @@ class BreakSearch {
   [[nodiscard]] double bits(const Window& w, int segment, CurvePredictor& predictor) const {
     const auto s = static_cast<std::size_t>(segment);
     const int length = w.length(segment);
-    predictor.begin(w.end[s].data());
     const int goal = std::min((w.at[s] / task_.interval + 1) * task_.interval, task_.frames - 1);
+    predictor.begin(w.end[s].data(), length, goal - w.at[s]);
     const bool last = w.at[s + 1] == goal;
     const int after = segment + 1 < w.segments ? w.length(segment + 1) : length;
     const double coarse = end_step(quarter_step(task_.step_index), last ? 16 : length, last ? 16 : after);
@@ -191,11 +191,11 @@ class BreakSearch {
     double product = 1, count = static_cast<double>(n_);
     for (std::size_t d = 0; d < n_; ++d) {
       // The goal of a common break is not known here; the data is near it.
-      const double expected = predictor.end(d, length, goal - w.at[s], task_.at(goal)[d]);
+      const double expected = predictor.end(d, task_.at(goal)[d]);
       const double off = last ? 0 : (w.end[s + 1][d] - expected) / coarse;
       product *= 1 + 4 * off * off;
       if (length < 2) continue;
-      const double bend = (w.middle[s][d] - predictor.middle(d, length, w.end[s + 1][d])) / fine;
+      const double bend = (w.middle[s][d] - predictor.middle(d, w.end[s + 1][d])) / fine;
       product *= 1 + 4 * bend * bend;
     }
     if (!last && length > 1) count *= 2;

@@ -113,22 +113,21 @@ class NumberChoice {
     known[0] = common_[interval];
     for (std::size_t s = 0; s < m; ++s) {
       const int frames = length(first + s);
-      predictor_.begin(known[end_row(s)].data());
+      const int rest = out_.breaks[last] - out_.breaks[first + s];
+      predictor_.begin(known[end_row(s)].data(), frames, rest);
       Point& end = known[end_row(s + 1)];
       end = goal;
       context_.begin_point(frames);
       if (s + 1 < m) {
         const double step = end_step(shape_.step(), frames, length(first + s + 1));
-        const int rest = out_.breaks[last] - out_.breaks[first + s];
         for (std::size_t d = 0; d < n_; ++d) {
-          choose_number(PointKind::end, d, predictor_.end(d, frames, rest, goal[d]), step, system, end_row(s + 1),
-                        known);
+          choose_number(PointKind::end, d, predictor_.end(d, goal[d]), step, system, end_row(s + 1), known);
         }
       }
       context_.begin_point(frames);
       const double step = middle_step(shape_.step(), frames);
       for (std::size_t d = 0; d < n_; ++d) {
-        const double expected = predictor_.middle(d, frames, end[d]);
+        const double expected = predictor_.middle(d, end[d]);
         known[middle_row(s)][d] = expected;
         if (frames > 1) choose_number(PointKind::middle, d, expected, step, system, middle_row(s), known);
       }

@@ -179,7 +179,7 @@ class CurveDecoder {
   void segment(int length, int next, int rest, const double* goal, CurvePredictor& predictor, CodedCurve& out) {
     Point start{}, middle{}, end{};
     std::copy(out.ends.end() - static_cast<std::ptrdiff_t>(n_), out.ends.end(), start.begin());
-    predictor.begin(start.data());
+    predictor.begin(start.data(), length, rest);
     code_.begin_point(length);
     const double coarse = next > 0 ? end_step(shape_.step(), length, next) : 0;
     for (std::size_t d = 0; d < n_; ++d) {
@@ -189,14 +189,14 @@ class CurveDecoder {
       }
       std::int64_t number = 0;
       code_.number(PointKind::end, d, number);
-      end[d] = checked(predictor.end(d, length, rest, goal[d]) + static_cast<double>(number) * coarse);
+      end[d] = checked(predictor.end(d, goal[d]) + static_cast<double>(number) * coarse);
     }
     code_.begin_point(length);
     const double fine = middle_step(shape_.step(), length);
     for (std::size_t d = 0; d < n_; ++d) {
       std::int64_t number = 0;
       if (length > 1) code_.number(PointKind::middle, d, number);
-      middle[d] = checked(predictor.middle(d, length, end[d]) + static_cast<double>(number) * fine);
+      middle[d] = checked(predictor.middle(d, end[d]) + static_cast<double>(number) * fine);
     }
     predictor.advance(length, middle.data(), end.data());
     out.breaks.push_back(out.breaks.back() + length);
@@ -229,24 +229,28 @@ double middle_step(double step, int length) {
   return step * quarter_step(half_octaves(length) - 9);
 }
 
-double CurvePredictor::end(std::size_t d, int length, int rest, double goal) const {
-  const double towards = (goal - start_[d]) * (static_cast<double>(length) / rest);
-  if (!moving_) return start_[d] + curve_priors::first_towards * towards;
-  return start_[d] + (curve_priors::onwards * slope_[d] * length + curve_priors::towards * towards);
-}
-
-double CurvePredictor::middle(std::size_t d, int length, double end) const {
-  const double half = (start_[d] + end) / 2;
-  if (!moving_ || length < 2) return half;
-  const double smooth = start_[d] + slope_[d] * length / 2;
-  return half + curve_priors::smooth * (smooth - half);
+void CurvePredictor::begin(const double* start, int length, int rest) {
+  start_ = start;
+  half_length_ = length / 2.0;
+  const double share = static_cast<double>(length) / rest;
+  if (length_before_ == 0) {
+    onwards_ = smooth_ = 0;
+    towards_ = curve_priors::first_towards * share;
+    return;
+  }
+  // The slope of a segment that was much shorter says little, and less about short segments, which are where it turns.
+  const double ratio = static_cast<double>(length_before_) / length - 0.1;
+  const double near = std::min(length / 6.0, 1.0);
+  onwards_ = curve_priors::onwards * std::clamp(ratio / 0.8, 0.0, 1.0) * near * length;
+  towards_ = (curve_priors::towards + curve_priors::towards_last * share) * share;
+  smooth_ = length > 1 ? curve_priors::smooth * std::clamp(ratio / 0.5, 0.0, 1.0) : 0;
 }
 
 void CurvePredictor::advance(int length, const double* middle, const double* end) {
   for (std::size_t d = 0; d < static_cast<std::size_t>(shape_.dimensions); ++d) {
     slope_[d] = length > 1 ? 2 * (end[d] - middle[d]) / length : end[d] - start_[d];
   }
-  moving_ = true;
+  length_before_ = length;
 }
 
 CurveModels::CurveModels() {

@@ -53,21 +53,26 @@ struct CodedCurve {
 class CurvePredictor {
  public:
   explicit CurvePredictor(const CurveShape& shape) : shape_(shape) {}
-  // A new interval starts at the curve's end so far.
-  void begin(const double* start) { start_ = start; }
-  // The end of the next segment, `length` frames on; the next common break is `rest` frames on at `goal`.
-  [[nodiscard]] double end(std::size_t d, int length, int rest, double goal) const;
+  // A segment of `length` frames starts at the curve's end so far; the next common break is `rest` frames on.
+  void begin(const double* start, int length, int rest);
+  // Its end, when the curve is at `goal` at the common break.
+  [[nodiscard]] double end(std::size_t d, double goal) const {
+    return start_[d] + (onwards_ * slope_[d] + towards_ * (goal - start_[d]));
+  }
   // Its middle, once its end is known.
-  [[nodiscard]] double middle(std::size_t d, int length, double end) const;
+  [[nodiscard]] double middle(std::size_t d, double end) const {
+    const double half = (start_[d] + end) / 2;
+    return half + smooth_ * (start_[d] + slope_[d] * half_length_ - half);
+  }
   // The segment is known.
   void advance(int length, const double* middle, const double* end);
 
  private:
-  [[nodiscard]] double slope(std::size_t d) const { return slope_[d]; }
   CurveShape shape_;
   const double* start_ = nullptr;
-  Point slope_{};  // per frame, at the end so far
-  bool moving_ = false;
+  Point slope_{};          // per frame, at the end so far
+  int length_before_ = 0;  // 0: there is no slope yet
+  double onwards_ = 0, towards_ = 0, smooth_ = 0, half_length_ = 0;
 };
 
 // What adapts while a curve is coded. Starts from what recordings taught.

@@ -8,12 +8,13 @@
 
 namespace kinespace::curve_priors {
 
-// Of the end of a segment: along the slope at its start, and towards the next common break.
-inline constexpr double onwards = 0.316;
-inline constexpr double towards = 0.543;
+// Of the end of a segment: along the slope at its start, and towards the next common break, more so when that is near.
+inline constexpr double onwards = 0.294;
+inline constexpr double towards = 0.519;
+inline constexpr double towards_last = 0.493;
 inline constexpr double first_towards = 0.671;
 // Of its middle: how much of the way from the chord's to that which goes on smoothly.
-inline constexpr double smooth = 0.303;
+inline constexpr double smooth = 0.305;
 
 // [kind][size]
 inline constexpr std::array<std::array<std::uint16_t, 8>, 3> nonzero{
