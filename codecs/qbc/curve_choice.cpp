@@ -89,9 +89,11 @@ class NumberChoice {
       context_.begin_point(1);
       const std::size_t row = end_row(b);
       for (std::size_t d = 0; d < n_; ++d) {
-        const double before = i > 0 ? common_[i - 1][d] : 0;
-        const std::int64_t number = best_number(PointKind::common, d, before, step, free_[row][d], system.weight(row));
-        common_[i][d] = before + static_cast<double>(number) * step;
+        const double before = i > 0 ? common_[i - 1][d] : 0, earlier = i > 1 ? common_[i - 2][d] : 0;
+        const double expected = expected_common(static_cast<int>(i), before, earlier);
+        const std::int64_t number =
+            best_number(PointKind::common, d, expected, step, free_[row][d], system.weight(row));
+        common_[i][d] = expected + static_cast<double>(number) * step;
         out_.common.push_back(number);
       }
     }

@@ -40,7 +40,7 @@ class CurveCoder {
       bool negative = value < 0;
       code_even(coder_, negative);
       std::int64_t magnitude = std::abs(value);
-      code_magnitude(models_.exponent[k][size], magnitude);
+      code_magnitude(models_.exponent[k][size], models_.second[k], magnitude);
       value = negative ? -magnitude : magnitude;
     }
     context_.see(kind, d, value);
@@ -81,7 +81,8 @@ class CurveCoder {
  private:
   static std::size_t class_at(int x) { return static_cast<std::size_t>(class_of(x)); }
 
-  void code_magnitude(std::array<AdaptiveBit, CurveModels::exponents>& models, std::int64_t& magnitude) {
+  void code_magnitude(std::array<AdaptiveBit, CurveModels::exponents>& models,
+                      std::array<AdaptiveBit, CurveModels::exponents>& second, std::int64_t& magnitude) {
     int exponent = encodes<Coder> ? bit_length(static_cast<std::uint64_t>(magnitude)) - 1 : 0;
     for (int e = 0;; ++e) {
       bool more = e < exponent;
@@ -97,7 +98,11 @@ class CurveCoder {
     std::int64_t out = 1;
     for (int i = exponent - 1; i >= 0; --i) {
       bool bit = ((magnitude >> i) & 1) != 0;
-      code_even(coder_, bit);
+      if (i == exponent - 1) {
+        code_bit(coder_, second[static_cast<std::size_t>(exponent)], bit);
+      } else {
+        code_even(coder_, bit);
+      }
       out = 2 * out + (bit ? 1 : 0);
     }
     magnitude = out;
@@ -145,8 +150,8 @@ class CurveDecoder {
       for (std::size_t d = 0; d < n_; ++d) {
         std::int64_t number = 0;
         code_.number(PointKind::common, d, number);
-        const double before = i > 0 ? out[out.size() - n_] : 0;
-        out.push_back(checked(before + static_cast<double>(number) * step));
+        const double before = i > 0 ? out[out.size() - n_] : 0, earlier = i > 1 ? out[out.size() - 2 * n_] : 0;
+        out.push_back(checked(expected_common(i, before, earlier) + static_cast<double>(number) * step));
       }
       check_coder();
     }
@@ -220,6 +225,10 @@ class CurveDecoder {
 
 }  // namespace
 
+double expected_common(int count, double before, double earlier) {
+  return count > 1 ? before + curve_priors::back * (earlier - before) : before;
+}
+
 double end_step(double step, int length_before, int length_after) {
   // A point in the middle of 32 frames has the step itself.
   return step * quarter_step(half_octaves(length_before + length_after) - 10);
@@ -261,6 +270,11 @@ CurveModels::CurveModels() {
       for (std::size_t e = 0; e < curve_priors::more[k][s].size(); ++e) {
         exponent[k][s][e] = {curve_priors::more[k][s][e], trust};
       }
+    }
+  }
+  for (auto& kind : second) {
+    for (std::size_t e = 0; e < kind.size(); ++e) {
+      kind[e] = {curve_priors::second[std::min(e, curve_priors::second.size() - 1)], trust};
     }
   }
   for (std::size_t i = 0; i < segments.size(); ++i) {

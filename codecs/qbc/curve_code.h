@@ -45,6 +45,9 @@ struct CodedCurve {
   int step_index = 0;                        // of the shape
 };
 
+// Where a common break is expected behind those before it, the last of them `before` and the one before that.
+[[nodiscard]] double expected_common(int count, double before, double earlier);
+
 // Steps for a point that counts for so many frames.
 [[nodiscard]] double end_step(double step, int length_before, int length_after);
 [[nodiscard]] double middle_step(double step, int length);
@@ -85,6 +88,7 @@ class CurveModels {
 
   std::array<std::array<AdaptiveBit, sizes>, kinds> zero;
   std::array<std::array<std::array<AdaptiveBit, exponents>, sizes>, kinds> exponent;
+  std::array<std::array<AdaptiveBit, exponents>, kinds> second;  // binary digit of a number
   std::array<std::array<AdaptiveBit, 12>, 3> segments;
   std::array<std::array<AdaptiveBit, 12>, 12> length;
   std::array<AdaptiveBit, 12> length_top;

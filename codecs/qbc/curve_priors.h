@@ -13,6 +13,8 @@ inline constexpr double onwards = 0.294;
 inline constexpr double towards = 0.519;
 inline constexpr double towards_last = 0.493;
 inline constexpr double first_towards = 0.671;
+// Of a common break: back to the one before the last.
+inline constexpr double back = 0.2;
 // Of its middle: how much of the way from the chord's to that which goes on smoothly.
 inline constexpr double smooth = 0.305;
 
@@ -47,6 +49,9 @@ inline constexpr std::array<std::array<std::array<std::uint16_t, 6>, 8>, 3> more
        {54016, 44713, 29757, 17692, 9292, 12702},
        {57406, 51858, 43253, 32964, 21228, 13063},
        {60274, 55904, 50349, 43587, 35915, 23450}}}}};
+
+// That the binary digit behind the first is a 1: [digits behind the first]
+inline constexpr std::array<std::uint16_t, 5> second{32768, 28300, 25500, 21300, 18000};
 
 // That a segment is the last of its interval: [how many are before it][binary digits of the places left]
 inline constexpr std::array<std::array<std::uint16_t, 12>, 3> last{
