@@ -7,6 +7,7 @@
 #include "codecs/integer_model.h"
 #include "codecs/mesh/draco_surface.h"
 #include "codecs/mesh/vertex_order.h"
+#include "mesh/connectivity.h"
 
 namespace kinespace {
 namespace {
@@ -123,10 +124,6 @@ void get_positions(IntegerReader& in, KeyMesh& mesh, std::span<const std::int32_
   }
 }
 
-Triangle turned(const Triangle& t) {
-  return std::min({t, Triangle{t[1], t[2], t[0]}, Triangle{t[2], t[0], t[1]}});
-}
-
 // What `all` has more of than `some`; none when `some` is not part of it. Both canonical.
 std::optional<std::vector<Triangle>> difference(std::span<const Triangle> all, std::span<const Triangle> some) {
   if (!std::includes(all.begin(), all.end(), some.begin(), some.end())) return {};
@@ -142,10 +139,32 @@ struct DracoPart {
   std::vector<Triangle> missing;  // of vertices, canonical
 };
 
-// Whether every point knows its vertex.
-bool all_known(const Surface& decoded, int vertices) {
-  return std::all_of(decoded.label.begin(), decoded.label.end(),
-                     [&](std::int32_t v) { return v >= 0 && v < vertices; });
+// Draco numbers points otherwise where there are labels, but triangles and their corners come in the same order.
+std::optional<std::vector<std::int32_t>> labels_of(const Surface& plain, const Surface& told, int vertices) {
+  if (told.label.size() != static_cast<std::size_t>(told.points) || told.triangles.size() != plain.triangles.size()) {
+    return {};
+  }
+  std::vector<std::int32_t> out(static_cast<std::size_t>(plain.points), -1);
+  for (std::size_t t = 0; t < plain.triangles.size(); ++t) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::int32_t label = told.label[static_cast<std::size_t>(told.triangles[t][i])];
+      std::int32_t& known = out[static_cast<std::size_t>(plain.triangles[t][i])];
+      if (label < 0 || label >= vertices || (known >= 0 && known != label)) return {};
+      known = label;
+    }
+  }
+  if (std::any_of(out.begin(), out.end(), [](std::int32_t label) { return label < 0; })) return {};
+  return out;
+}
+
+// Every point has the position of its vertex.
+bool agrees(const Surface& plain, std::span<const std::int32_t> vertex_of, const KeyMesh& mesh) {
+  for (std::size_t k = 0; k < mesh.keys.size(); ++k) {
+    for (std::size_t p = 0; p < vertex_of.size(); ++p) {
+      if (plain.keys[k][p] != mesh.keys[k][static_cast<std::size_t>(vertex_of[p])]) return false;
+    }
+  }
+  return true;
 }
 
 // A label on every point tells which vertex it was; then the same mesh without the labels.
@@ -161,12 +180,10 @@ std::optional<DracoPart> with_draco(const KeyMesh& mesh) {
   const auto keys = static_cast<int>(mesh.keys.size());
   Surface plain = draco_decode(*bytes, mesh.vertices * 4, faces, keys, false, "");
   const Surface told = draco_decode(*labelled, mesh.vertices * 4, faces, keys, true, "");
-  if (told.points != plain.points || told.triangles != plain.triangles || told.keys != plain.keys ||
-      told.label.size() != static_cast<std::size_t>(told.points) || !all_known(told, mesh.vertices)) {
-    return {};
-  }
+  auto vertex_of = labels_of(plain, told, mesh.vertices);
+  if (!vertex_of || !agrees(plain, *vertex_of, mesh)) return {};
   DracoPart out{.bytes = std::move(*bytes), .triangles = std::move(plain.triangles), .map = {}, .missing = {}};
-  out.map = map_points(told.label, mesh.vertices);
+  out.map = map_points(std::move(*vertex_of), mesh.vertices);
   std::vector<Triangle> coded = out.triangles;
   for (Triangle& t : coded) {
     for (std::int32_t& p : t) p = out.map.vertex_of[static_cast<std::size_t>(p)];
@@ -262,12 +279,6 @@ std::vector<std::int32_t> all_of(int vertices) {
 }
 
 }  // namespace
-
-std::vector<Triangle> canonical_triangles(std::vector<Triangle> triangles) {
-  for (Triangle& t : triangles) t = turned(t);
-  std::sort(triangles.begin(), triangles.end());
-  return triangles;
-}
 
 PackedKeyMesh pack_key_mesh(const KeyMesh& mesh) {
   if (const auto part = with_draco(mesh)) {

@@ -30,9 +30,7 @@ struct PackedKeyMesh {
   Bytes order;    // and corrections
 };
 
-// Lowest vertex first, orientation kept, sorted: as unpack_key_mesh gives them.
-[[nodiscard]] std::vector<Triangle> canonical_triangles(std::vector<Triangle> triangles);
-
+// Triangles come back as canonical_triangles (mesh/connectivity.h) has them.
 [[nodiscard]] PackedKeyMesh pack_key_mesh(const KeyMesh& mesh);
 // Throws Error{bad_input} naming `source`.
 [[nodiscard]] KeyMesh unpack_key_mesh(std::span<const std::byte> surface, std::span<const std::byte> order,

@@ -1,5 +1,6 @@
 #include "codecs/mesh/mesh_codec.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -8,7 +9,10 @@
 #include <tbb/parallel_for.h>
 
 #include "base/error.h"
+#include "codecs/mesh/draco_frames.h"
 #include "codecs/mesh/harmonics_stream.h"
+#include "codecs/mesh/paper_harmonics.h"
+#include "codecs/mesh/trajectory_pca.h"
 
 namespace kinespace {
 namespace {
@@ -34,6 +38,9 @@ void MeshCodecOptions::validate(const MeshSequence& mesh) const {
   }
   if (clusters > 1 && profile != MeshProfile::paper) {
     out_of_range("clusters", clusters, "1 with the standard profile, which has one key-frame");
+  }
+  if (coarse_vertices != 0 && profile == MeshProfile::paper) {
+    out_of_range("coarse_vertices", coarse_vertices, "0 with profile paper");
   }
   if (coarse_vertices != 0 && coarse_vertices < 4) out_of_range("coarse_vertices", coarse_vertices, "0, or 4 and more");
 }
@@ -63,7 +70,18 @@ std::span<const std::string_view> mesh_codecs() {
 Bytes encode_mesh(std::string_view codec, const MeshSequence& mesh, const MeshCodecOptions& options) {
   require_valid(mesh, mesh.name);
   options.validate(mesh);
-  if (codec == names[0]) return encode_harmonics(mesh, options);
+  if (codec == names[0]) {
+    return options.profile == MeshProfile::paper ? encode_paper_harmonics(mesh, options)
+                                                 : encode_harmonics(mesh, options);
+  }
+  const bool harmonics_only = options.profile != MeshProfile::standard || options.bases > 0 || options.clusters > 0 ||
+                              options.coarse_vertices > 0;
+  if (harmonics_only && std::find(names.begin(), names.end(), codec) != names.end()) {
+    throw Error(ErrorKind::usage, {.found = fmt::format("profile, bases, clusters or coarse vertices for {}", codec),
+                                   .expected = "these with mesh-harmonics only"});
+  }
+  if (codec == names[1]) return encode_trajectory_pca(mesh, options);
+  if (codec == names[2]) return encode_draco_frames(mesh, options);
   throw Error(ErrorKind::usage,
               {.found = fmt::format("mesh codec {}", codec), .expected = fmt::format("{}", fmt::join(names, ", "))});
 }
@@ -74,7 +92,19 @@ bool is_mesh_stream(std::span<const std::byte> bytes) {
 
 std::unique_ptr<MeshStreamReader> open_mesh_stream(std::span<const std::byte> bytes, std::string source) {
   Bitstream stream = Bitstream::parse(bytes, std::move(source));
-  return open_harmonics(std::move(stream));
+  const std::string& kind = stream.kind();
+  const std::string_view codec =
+      kind.starts_with(kind_prefix) ? std::string_view(kind).substr(kind_prefix.size()) : std::string_view();
+  const std::string* profile = stream.find_option("profile");
+  if (codec == names[0]) {
+    return profile != nullptr && *profile == "paper" ? open_paper_harmonics(std::move(stream))
+                                                     : open_harmonics(std::move(stream));
+  }
+  if (codec == names[1]) return open_trajectory_pca(std::move(stream));
+  if (codec == names[2]) return open_draco_frames(std::move(stream));
+  throw Error(ErrorKind::bad_input, {.file = stream.source(),
+                                     .found = "a stream of kind " + kind,
+                                     .expected = "a stream of a mesh sequence by a codec that this build knows"});
 }
 
 double bits_per_vertex_and_frame(std::int64_t bytes, const MeshSequence& layout) {

@@ -1,0 +1,18 @@
+// What a stream of a mesh sequence says about itself: its measured error.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "mesh/mesh_error.h"
+#include "storage/bitstream.h"
+
+namespace kinespace {
+
+// The error of frames that a decoder gives; `rigidity`: with lr, which takes longer.
+[[nodiscard]] MeshError measured(const MeshSequence& mesh, const std::function<Points(int)>& frame, bool rigidity);
+
+// Options kg, kg_time, lr and connectivity (bytes).
+void set_measured(BitstreamWriter& out, const MeshError& error, std::int64_t connectivity);
+
+}  // namespace kinespace
