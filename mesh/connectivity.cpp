@@ -50,4 +50,10 @@ Components connected_components(const Neighbours& neighbours) {
   return out;
 }
 
+std::vector<Triangle> canonical_triangles(std::vector<Triangle> triangles) {
+  for (Triangle& t : triangles) t = std::min({t, Triangle{t[1], t[2], t[0]}, Triangle{t[2], t[0], t[1]}});
+  std::sort(triangles.begin(), triangles.end());
+  return triangles;
+}
+
 }  // namespace kinespace

@@ -38,4 +38,8 @@ struct Components {
 };
 [[nodiscard]] Components connected_components(const Neighbours& neighbours);
 
+// Each triangle turned so that the least sequence of its vertices results (orientation kept), all in ascending order:
+// equal for meshes that differ only in the order of their triangles.
+[[nodiscard]] std::vector<Triangle> canonical_triangles(std::vector<Triangle> triangles);
+
 }  // namespace kinespace

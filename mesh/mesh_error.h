@@ -28,7 +28,8 @@ struct MeshError {
   double max_error_over_diagonal = 0;
 };
 
-// `a` is the reference. Throws Error{bad_input} when vertices, frames or triangles differ.
+// `a` is the reference. Throws Error{bad_input} when vertices, frames or triangles differ; the order of the triangles,
+// and which of a triangle's vertices comes first, do not matter.
 [[nodiscard]] MeshError compare(const MeshSequence& a, const MeshSequence& b);
 
 // The same without lr, which takes most of the time (it is 0 here): for searches over many settings.
