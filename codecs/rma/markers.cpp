@@ -12,7 +12,9 @@
 namespace kinespace {
 namespace {
 
-constexpr double marker_cm = 5;      // of markers that stand for no joint
+constexpr double marker_cm = 5;  // of markers that stand for no joint
+constexpr double middling_bone_cm = 10;
+constexpr double long_bone_cm = 22;
 constexpr double short_bone_cm = 2;  // what cannot tell a direction well
 
 // The axes of a bone: along it, the part of `across` at right angles to it, and both's normal. False for none.
@@ -106,6 +108,7 @@ MarkerRig::MarkerRig(const Skeleton& skeleton) {
     Bone& bone = bones_[b];
     bone.along = choose_along(points[b]);
     bone.across = choose_across(points[b], bone.along);
+    bone.trust = std::clamp((long_bone_cm - bone.along.norm()) / (long_bone_cm - middling_bone_cm), 0.0, 1.0);
     Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
     axes_of(bone.along, bone.across, axes);
     bone.back = axes.transpose();
@@ -148,7 +151,15 @@ void MarkerRig::rotations(std::span<const double> markers, std::span<Eigen::Quat
     at[b] = bone.parent < 0 ? root : Eigen::Vector3d(at[parent] + turn[parent] * bone.offset);
     const double* m = markers.data() + 3 + 6 * b;
     Eigen::Matrix3d axes;
-    const Eigen::Vector3d from = own.empty() ? at[b] : Eigen::Vector3d(own[3 * b], own[3 * b + 1], own[3 * b + 2]);
+    Eigen::Vector3d from = at[b];
+    if (!own.empty()) {
+      from = Eigen::Vector3d(own[3 * b], own[3 * b + 1], own[3 * b + 2]);
+    } else if (bone.parent >= 0 && bone.trust > 0) {
+      const Bone& above = bones_[parent];
+      const double* p = markers.data() + 3 + 6 * parent;
+      const Eigen::Vector3d shown = Eigen::Vector3d(p[0], p[1], p[2]) + turn[parent] * (bone.offset - above.along);
+      from += bone.trust * (shown - from);
+    }
     const bool told = axes_of(Eigen::Vector3d(m[0], m[1], m[2]) - from, Eigen::Vector3d(m[3], m[4], m[5]) - from, axes);
     if (told) {
       turn[b] = axes * bone.back;

@@ -17,8 +17,10 @@
 //
 // The way back goes from the root outwards: a joint stands where its parents put it, points exactly at its marker
 // `along` and turns so that `across` lies on its side of it. Bone lengths come from the skeleton alone, so markers that
-// bones cannot meet (decoded ones) are aimed at, and no error piles up along a limb. Round trip: < 1e-6 rad, twist
-// included. What it does not do: translations of joints other than the travel root (side tracks carry them).
+// bones cannot meet (decoded ones) are aimed at, and no error piles up along a limb. Short bones (below 22 cm, wholly
+// below 10 cm) take their direction from where the markers have the joint: it would be lost in the joint's own error.
+// Round trip: < 1e-6 rad, twist included. What it does not do: translations of joints other than the travel root (side
+// tracks carry them).
 #pragma once
 
 #include <span>
@@ -58,6 +60,7 @@ class MarkerRig {
     Eigen::Vector3d offset = Eigen::Vector3d::Zero();
     Eigen::Vector3d along = Eigen::Vector3d::Zero();
     Eigen::Vector3d across = Eigen::Vector3d::Zero();
+    double trust = 0;  // how much its direction is told from where the markers, not the bones, have the joint
     Eigen::Matrix3d back = Eigen::Matrix3d::Identity();  // from the bone's own axes to (along, across, both)
   };
   std::vector<Bone> bones_;
