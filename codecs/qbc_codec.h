@@ -18,7 +18,7 @@
 // more finely where that pays: eight of 2751 can hold half of a clip's error (codecs/qbc/pole_corrections.h).
 //
 // Targets set the limit. The mean squared error (equation 11) is about a ninetieth of d^2 (more by the paper's rule);
-// encoding takes about a millisecond a frame, one without `merge` a tenth of that.
+// encoding takes about a fifth of a millisecond a frame, without `merge` a tenth of that.
 #pragma once
 
 #include "codecs/codec.h"
