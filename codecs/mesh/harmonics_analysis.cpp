@@ -73,7 +73,7 @@ void HarmonicsAnalysis::find_coefficients() {
     block.coefficients.resize(3 * std::int64_t{space_->functions()}, split_.size(b));
     tbb::parallel_for(0, split_.size(b), [&](int at) {
       const Points& x = aligned_[static_cast<std::size_t>(split_.first(b) + at)];
-      const Coefficients c = space_->projection().coefficients(x) - space_->key_coefficients();
+      const Coefficients c = space_->coefficients(x, settings_.rotate) - space_->key_coefficients();
       for (int k = 0; k < space_->functions(); ++k) {
         for (int d = 0; d < 3; ++d) block.coefficients(3 * k + d, at) = c(k, d);
       }
@@ -135,7 +135,7 @@ HarmonicsAnalysis::Attempt HarmonicsAnalysis::code(double step, bool exact, Harm
     out.bytes += static_cast<std::int64_t>(motion.bytes.size() + detail.bytes.size());
     out.motion.push_back(std::move(motion.bytes));
     out.detail.push_back(std::move(detail.bytes));
-    if (frames != nullptr) frames->blocks.push_back({std::move(motion.part), std::move(detail.part)});
+    if (frames != nullptr) frames->add_block(motion.part, std::move(detail.part));
   }
   return out;
 }

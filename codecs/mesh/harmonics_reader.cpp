@@ -1,4 +1,5 @@
 // mesh-harmonics, standard profile: from the stream to frames.
+#include <algorithm>
 #include <chrono>
 
 #include "base/error.h"
@@ -48,14 +49,21 @@ class HarmonicsReader final : public MeshStreamReader {
  private:
   void read_blocks(const HarmonicsSpace& space, const HarmonicsSetup& setup) {
     const FrameBlocks split{setup.layout.frames};
-    const std::int64_t most = most_numbers(stream_.size());
+    std::int64_t room = most_numbers(stream_.size());  // for all blocks together
     for (int b = 0; b < split.count(); ++b) {
       const std::string number = std::to_string(b);
-      HarmonicsFrames::Block& block = frames_->blocks.emplace_back();
-      block.motion = decode_part(stream_.section("m" + number), split.size(b), space.function_graph(), setup.step, most,
-                                 stream_.source());
-      block.detail = decode_part(stream_.section("d" + number), split.size(b), space.vertex_graph(), setup.step, most,
-                                 stream_.source());
+      const MovingPart motion = decode_part(stream_.section("m" + number), split.size(b), space.function_graph(),
+                                            setup.step, room, stream_.source());
+      room -= motion.functions.cols() * space.vertices() * 3;
+      MovingPart detail = decode_part(stream_.section("d" + number), split.size(b), space.vertex_graph(), setup.step,
+                                      std::max<std::int64_t>(room, 0), stream_.source());
+      room -= detail.functions.cols() * space.vertices() * 3;
+      if (room < 0) {
+        throw Error(ErrorKind::bad_input, {.file = stream_.source(),
+                                           .found = "more components than so few bytes can fill",
+                                           .expected = "what the encoder writes (damaged)"});
+      }
+      frames_->add_block(motion, std::move(detail));
     }
   }
 

@@ -1,6 +1,7 @@
 #include "codecs/mesh/harmonics_space.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <utility>
 
@@ -89,27 +90,33 @@ std::vector<Eigen::Matrix3d> HarmonicsSpace::rotations(const Points& low, bool r
   return ring_rotations(neighbours_, key_low_, low);
 }
 
-Points HarmonicsSpace::frame(const Coefficients& c, bool rotate, std::span<const double> residual) const {
-  const Points low = projection_.synthesise(c);
+Points HarmonicsSpace::frame(const Points& low, bool rotate, std::span<const double> residual) const {
   const auto turns = rotations(low, rotate);
-  Points d = detail_;
-  for (Eigen::Index v = 0; v < d.rows(); ++v) {
-    Eigen::Vector3d at = d.row(v).transpose();
+  Points x = low;
+  for (Eigen::Index v = 0; v < x.rows(); ++v) {
+    std::array<double, 3> at{detail_(v, 0), detail_(v, 1), detail_(v, 2)};
     if (!residual.empty()) {
-      for (int a = 0; a < 3; ++a) at[a] += residual[static_cast<std::size_t>(3 * v + a)];
+      for (std::size_t a = 0; a < 3; ++a) at[a] += residual[3 * static_cast<std::size_t>(v) + a];
     }
-    if (rotate) {
-      const Eigen::Matrix3d& r = turns[static_cast<std::size_t>(v)];
-      for (int a = 0; a < 3; ++a) d(v, a) = r(a, 0) * at[0] + r(a, 1) * at[1] + r(a, 2) * at[2];
-    } else {
-      d.row(v) = at.transpose();
+    if (!rotate) {
+      for (Eigen::Index a = 0; a < 3; ++a) x(v, a) += at[static_cast<std::size_t>(a)];
+      continue;
     }
+    const Eigen::Matrix3d& r = turns[static_cast<std::size_t>(v)];
+    for (Eigen::Index a = 0; a < 3; ++a) x(v, a) += r(a, 0) * at[0] + r(a, 1) * at[1] + r(a, 2) * at[2];
   }
-  Coefficients back = projection_.correlations(d);
-  back = -back;
-  Points x = low + d;
-  projection_.add(back, x);
   return x;
+}
+
+Coefficients HarmonicsSpace::coefficients(const Points& wanted, bool rotate) const {
+  constexpr int iterations = 3;
+  const Coefficients whole = projection_.coefficients(wanted);
+  Coefficients c = whole;
+  for (int i = 0; rotate && i < iterations; ++i) {
+    const Points low = projection_.synthesise(c);
+    c = whole - projection_.correlations(frame(low, true, {}) - low);
+  }
+  return c;
 }
 
 void HarmonicsSpace::residual(const Points& wanted, const Coefficients& c, bool rotate, std::span<double> out) const {

@@ -1,11 +1,12 @@
 // What encoder and decoder of mesh-harmonics (standard profile) both make from a decoded key-frame.
 //
 //   U        smooth functions on the key-frame (mesh/smooth_basis.h), the same everywhere
-//   frame    x = U (c - U' d) + d,   d_v = R_v (key_v - (U U' key)_v + residual_v)
+//   frame    x = U c + d,   d_v = R_v (key_v - (U U' key)_v + residual_v)
 //
 // c: the coded coefficients of the frame; R_v: the rotation of the 1-ring of v from U U' key to U c (or none): details
-// of the key-frame turn with the surface. The parts in and outside of the functions' space are orthogonal, so the error
-// is the coefficients' error plus the residual's.
+// of the key-frame turn with the surface. What d has inside the functions' space is known to the encoder, which takes
+// it off the coefficients before it codes them: the low-frequency correction of mesh/deformation.h costs no decoding
+// then.
 #pragma once
 
 #include <span>
@@ -31,9 +32,14 @@ class HarmonicsSpace {
   [[nodiscard]] const NodeGraph& function_graph() const { return function_graph_; }
   [[nodiscard]] const NodeGraph& vertex_graph() const { return vertex_graph_; }
 
-  // The frame of these coefficients; `residual`: three numbers a vertex, or none.
-  [[nodiscard]] Points frame(const Coefficients& c, bool rotate, std::span<const double> residual) const;
-  // The residual with which frame() gives what it can of `wanted`. `c`: as the decoder has them.
+  // U U' key.
+  [[nodiscard]] const Points& key_low() const { return key_low_; }
+  // The frame of a low-frequency part U c; `residual`: three numbers a vertex, or none.
+  [[nodiscard]] Points frame(const Points& low, bool rotate, std::span<const double> residual) const;
+  // The coefficients with which frame() is closest to `wanted`, by fixed-point iteration: the details they bring change
+  // little with them.
+  [[nodiscard]] Coefficients coefficients(const Points& wanted, bool rotate) const;
+  // What is missing of `wanted` outside the functions' space, turned back. `c`: as the decoder has them.
   void residual(const Points& wanted, const Coefficients& c, bool rotate, std::span<double> out) const;
 
  private:

@@ -1,6 +1,9 @@
 #include "codecs/mesh/harmonics_stream.h"
 
+#include <algorithm>
 #include <utility>
+
+#include <tbb/parallel_for.h>
 
 #include "base/error.h"
 #include "codecs/integer_model.h"
@@ -103,18 +106,44 @@ Coefficients coefficients_of(const Coefficients& key, const MovingPart& motion, 
   return out;
 }
 
+void HarmonicsFrames::add_block(const MovingPart& motion, MovingPart detail) {
+  const auto vertices = static_cast<std::size_t>(space_->vertices());
+  const auto components = static_cast<std::size_t>(motion.functions.cols());
+  MovingPart low{.functions = motion.functions, .weights = {}, .nodes = space_->vertices()};
+  low.weights.resize(components * vertices * 3);
+  tbb::parallel_for(std::size_t{0}, components, [&](std::size_t r) {
+    Coefficients c(motion.nodes, 3);
+    const float* const row = motion.weights.data() + r * static_cast<std::size_t>(motion.nodes) * 3;
+    for (int k = 0; k < motion.nodes; ++k) {
+      for (int d = 0; d < 3; ++d) c(k, d) = static_cast<double>(row[3 * k + d]);
+    }
+    const Points moved = space_->projection().synthesise(c);
+    float* out = low.weights.data() + r * vertices * 3;
+    for (Eigen::Index v = 0; v < moved.rows(); ++v) {
+      for (Eigen::Index d = 0; d < 3; ++d) *out++ = static_cast<float>(moved(v, d));
+    }
+  });
+  blocks_.push_back({std::move(low), std::move(detail)});
+}
+
 Points HarmonicsFrames::frame(int f) const {
   const FrameBlocks split{static_cast<int>(track.steps.size())};
   const int b = split.of(f);
-  const Block& block = blocks[static_cast<std::size_t>(b)];
+  const Block& block = blocks_[static_cast<std::size_t>(b)];
   const int at = f - split.first(b);
-  const Coefficients c = coefficients_of(space_->key_coefficients(), block.motion, at);
-  std::vector<double> residual;
-  if (block.detail.functions.cols() > 0) {
-    residual.resize(static_cast<std::size_t>(block.detail.nodes) * 3);
-    block.detail.add(at, residual);
+  std::vector<double> numbers(static_cast<std::size_t>(space_->vertices()) * 3);
+  block.low.add(at, numbers);
+  Points low = space_->key_low();
+  for (Eigen::Index v = 0; v < low.rows(); ++v) {
+    for (Eigen::Index d = 0; d < 3; ++d) low(v, d) += numbers[static_cast<std::size_t>(3 * v + d)];
   }
-  Points x = space_->frame(c, rotate_, residual);
+  if (block.detail.functions.cols() > 0) {
+    std::fill(numbers.begin(), numbers.end(), 0.0);
+    block.detail.add(at, numbers);
+  } else {
+    numbers.clear();
+  }
+  Points x = space_->frame(low, rotate_, numbers);
   if (refinement_) x = refinement_->apply(x);
   return track.motion(static_cast<std::size_t>(f)).apply(x);
 }

@@ -61,14 +61,16 @@ struct HarmonicsParts {
 class HarmonicsFrames {
  public:
   struct Block {
-    MovingPart motion, detail;
+    MovingPart low, detail;  // of vertices
   };
   HarmonicsFrames(std::shared_ptr<const HarmonicsSpace> space, std::shared_ptr<const Refinement> refinement,
                   bool rotate)
       : space_(std::move(space)), refinement_(std::move(refinement)), rotate_(rotate) {}
 
-  std::vector<Block> blocks;
   RigidTrack track;
+
+  // `motion`: of the functions; what it moves of the vertices is summed up once, for all frames of the block.
+  void add_block(const MovingPart& motion, MovingPart detail);
 
   [[nodiscard]] Points frame(int f) const;
 
@@ -76,6 +78,7 @@ class HarmonicsFrames {
   std::shared_ptr<const HarmonicsSpace> space_;
   std::shared_ptr<const Refinement> refinement_;
   bool rotate_;
+  std::vector<Block> blocks_;
 };
 
 [[nodiscard]] std::unique_ptr<MeshStreamReader> open_harmonics(Bitstream stream);

@@ -3,12 +3,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "motion/simd.h"
 #include "storage/varint.h"
 
 namespace kinespace {
 namespace {
 
 constexpr double least_weight = 0.55;  // steps; what stays below in a whole component is not coded
+
+KINESPACE_VECTOR_CLONES
+void add_multiple(double by, const float* row, double* out, std::ptrdiff_t count) {
+  for (std::ptrdiff_t i = 0; i < count; ++i) out[i] += by * static_cast<double>(row[i]);
+}
 
 std::vector<float> in_units(const NodeValues& values, double step) {
   std::vector<float> out(values.value.size());
@@ -37,9 +43,8 @@ Bytes pack(FrameTransform transform, int components, const Bytes& basis, const B
 
 void MovingPart::add(int frame, std::span<double> out) const {
   for (Eigen::Index r = 0; r < functions.cols(); ++r) {
-    const double by = functions(frame, r);
-    const float* const row = weights.data() + static_cast<std::size_t>(r) * out.size();
-    for (std::size_t i = 0; i < out.size(); ++i) out[i] += by * static_cast<double>(row[i]);
+    add_multiple(functions(frame, r), weights.data() + static_cast<std::size_t>(r) * out.size(), out.data(),
+                 static_cast<std::ptrdiff_t>(out.size()));
   }
 }
 

@@ -1,0 +1,295 @@
+// `kinespace mesh`: streams of animated meshes.
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "cli/commands.h"
+#include "cli/json_output.h"
+#include "codecs/mesh/mesh_codec.h"
+#include "mesh/mesh_error.h"
+#include "mesh/mesh_files.h"
+#include "mesh/mesh_report.h"
+#include "mesh/picture.h"
+
+namespace kinespace::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+double seconds_since(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+bool is_stream_file(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return false;
+  const MappedFile file(path);
+  return is_mesh_stream(file.bytes());
+}
+
+// A sequence of files, or of a stream.
+MeshSequence read_any(const fs::path& path, std::optional<double> rate_hz) {
+  if (!is_stream_file(path)) return read_mesh_sequence(path, rate_hz);
+  const MappedFile file(path);
+  return open_mesh_stream(file.bytes(), path.string())->decode_all();
+}
+
+double number_of(const Bitstream& stream, const char* key) {
+  return stream.number_option(key, 0, std::numeric_limits<double>::max());
+}
+
+// The keys that encode and info share.
+Json stream_fields(const MeshStreamReader& reader) {
+  const MeshSequence& layout = reader.layout();
+  const auto bytes = static_cast<std::int64_t>(reader.stream().size());
+  return {{"vertices", layout.vertices},
+          {"triangles", layout.triangles.size()},
+          {"frames", layout.frames},
+          {"bytes", bytes},
+          {"bpvf", bits_per_vertex_and_frame(bytes, layout)},
+          {"bpvf_without_connectivity", bits_per_vertex_and_frame(bytes - reader.connectivity_bytes(), layout)},
+          {"kg", number_of(reader.stream(), "kg")},
+          {"kg_time", number_of(reader.stream(), "kg_time")},
+          {"lr", number_of(reader.stream(), "lr")}};
+}
+
+void print(const Json& result, bool json) {
+  json ? print_json(result) : print_fields(result);
+}
+
+struct EncodeOptions {
+  fs::path input;
+  fs::path output;
+  std::string codec = "mesh-harmonics";
+  std::string profile = "standard";
+  MeshCodecOptions codec_options;
+  std::optional<double> rate_hz;
+  bool json = false;
+};
+
+void run_encode(EncodeOptions& options, Session& session) {
+  require_different_files(options.input, options.output);
+  const MeshSequence mesh = read_mesh_sequence(options.input, options.rate_hz);
+  options.codec_options.profile = options.profile == "paper" ? MeshProfile::paper : MeshProfile::standard;
+  options.codec_options.progress = session.progress();
+  const auto start = Clock::now();
+  const Bytes stream = encode_mesh(options.codec, mesh, options.codec_options);
+  const double seconds = seconds_since(start);
+  session.finish_progress();
+  Session::check_stop();
+  write_file_atomically(options.output, std::span<const std::byte>(stream));
+  Json result{{"codec", options.codec}, {"output", options.output.string()}};
+  result.update(stream_fields(*open_mesh_stream(stream, options.output.string())));
+  result["encode_s"] = seconds;
+  print(result, options.json);
+}
+
+struct DecodeOptions {
+  fs::path stream;
+  fs::path output;
+  std::optional<int> from, to;
+  bool json = false;
+};
+
+MeshFormat format_of(const fs::path& output, const std::string& format) {
+  const std::string ending = output.extension().string();
+  if (ending == ".glb" || ending == ".gltf") return MeshFormat::gltf;
+  if (format == "obj") return MeshFormat::obj;
+  if (format == "ply") return MeshFormat::ply;
+  return MeshFormat::numpy;
+}
+
+void run_decode(const DecodeOptions& options, const std::string& format, Session& session) {
+  require_different_files(options.stream, options.output);
+  const MappedFile file(options.stream);
+  const auto start = Clock::now();
+  const auto reader = open_mesh_stream(file.bytes(), options.stream.string());
+  const double opened = seconds_since(start);
+  const int first = options.from.value_or(0);
+  const int last = options.to.value_or(reader->layout().frames - 1);
+  const Progress progress = session.progress();
+  const auto decoding = Clock::now();
+  const MeshSequence mesh = reader->decode(first, last - first + 1, progress);
+  const double seconds = seconds_since(decoding);
+  session.finish_progress();
+  write_mesh_sequence(options.output, mesh, format_of(options.output, format));
+  print({{"output", options.output.string()},
+         {"vertices", mesh.vertices},
+         {"triangles", mesh.triangles.size()},
+         {"frames", mesh.frames},
+         {"open_s", opened},
+         {"basis_s", reader->basis_seconds()},
+         {"decode_frames_per_s", mesh.frames / seconds}},
+        options.json);
+}
+
+struct CompareOptions {
+  fs::path reference, other;
+  std::optional<fs::path> picture;
+  std::optional<int> frame;
+  bool json = false;
+};
+
+// The frame with the largest error.
+int worst_frame(const MeshSequence& a, const MeshSequence& b) {
+  int worst = 0;
+  double most = -1;
+  for (int f = 0; f < a.frames; ++f) {
+    double sum = 0;
+    for (const double e : vertex_errors(a, b, f)) sum += e * e;
+    if (sum > most) {
+      most = sum;
+      worst = f;
+    }
+  }
+  return worst;
+}
+
+void run_compare(const CompareOptions& options) {
+  const MeshSequence a = read_any(options.reference, {});
+  Session::check_stop();
+  const MeshSequence b = read_any(options.other, {});
+  Session::check_stop();
+  const MeshError error = compare(a, b);
+  Json result{{"vertices", error.vertices},
+              {"triangles", a.triangles.size()},
+              {"frames", error.frames},
+              {"bytes", nullptr},
+              {"bpvf", nullptr},
+              {"bpvf_without_connectivity", nullptr},
+              {"kg", error.kg},
+              {"kg_time", error.kg_time},
+              {"lr", error.lr},
+              {"max_vertex_error", error.max_vertex_error},
+              {"max_error_over_diagonal", error.max_error_over_diagonal}};
+  if (is_stream_file(options.other)) {
+    const MappedFile file(options.other);
+    const auto reader = open_mesh_stream(file.bytes(), options.other.string());
+    const auto bytes = static_cast<std::int64_t>(file.bytes().size());
+    result["bytes"] = bytes;
+    result["bpvf"] = bits_per_vertex_and_frame(bytes, a);
+    result["bpvf_without_connectivity"] = bits_per_vertex_and_frame(bytes - reader->connectivity_bytes(), a);
+  }
+  if (options.picture) {
+    const int frame = options.frame.value_or(worst_frame(a, b));
+    const ComparisonPicture drawn = draw_comparison(a, b, frame);
+    write_png(*options.picture, drawn.picture);
+    result["picture"] = options.picture->string();
+    result["picture_frame"] = frame;
+    result["picture_red"] = drawn.worst;
+  }
+  print(result, options.json);
+}
+
+struct InfoOptions {
+  fs::path file;
+  bool json = false;
+};
+
+Json describe_sequence(const fs::path& path) {
+  const MeshReport found = report(read_mesh_sequence(path));
+  return {{"kind", "mesh"},
+          {"vertices", found.vertices},
+          {"triangles", found.triangles},
+          {"frames", found.frames},
+          {"rate_hz", found.rate_hz},
+          {"edges", found.edges},
+          {"diagonal", found.diagonal},
+          {"components", found.components},
+          {"watertight", found.watertight()},
+          {"boundary_edges", found.boundary_edges},
+          {"boundary_loops", found.boundary_loops},
+          {"nonmanifold_edges", found.nonmanifold_edges},
+          {"inconsistent_edges", found.inconsistent_edges},
+          {"degenerate_triangles", found.degenerate_triangles},
+          {"flat_triangles", found.flat_triangles},
+          {"duplicate_triangles", found.duplicate_triangles},
+          {"isolated_vertices", found.isolated_vertices}};
+}
+
+void run_info(const InfoOptions& options) {
+  if (!is_stream_file(options.file)) return print(describe_sequence(options.file), options.json);
+  const MappedFile file(options.file);
+  const auto reader = open_mesh_stream(file.bytes(), options.file.string());
+  const std::string& kind = reader->stream().kind();
+  Json result{{"kind", "mesh"}, {"codec", kind.substr(kind.find(':') + 1)}, {"rate_hz", reader->layout().rate_hz}};
+  result.update(stream_fields(*reader));
+  print(result, options.json);
+}
+
+void add_mesh_encode(CLI::App& mesh, Session& session) {
+  CLI::App* command = mesh.add_subcommand("encode", "A mesh sequence as a stream (.ksm)");
+  const auto options = std::make_shared<EncodeOptions>();
+  MeshCodecOptions& codec = options->codec_options;
+  command->add_option("IN", options->input, "A folder of OBJ, PLY or NumPy files, or a .glb or .gltf file")->required();
+  command->add_option("-o,--output", options->output, "The stream to write")->required();
+  std::vector<std::string> names(mesh_codecs().begin(), mesh_codecs().end());
+  command->add_option("--codec", options->codec, "mesh-harmonics, mesh-pca or mesh-draco")
+      ->check(CLI::IsMember(names))
+      ->capture_default_str();
+  command->add_option("--profile", options->profile, "Of mesh-harmonics: standard, or paper (as chen2019 has it)")
+      ->check(CLI::IsMember({"standard", "paper"}))
+      ->capture_default_str();
+  auto* kg = command->add_option("--kg", codec.kg, "Keep the KG error at or below so many percent (0.5)");
+  command->add_option("--bytes", codec.bytes, "Keep the whole stream within so many bytes")->excludes(kg);
+  command->add_option("--bases", codec.bases, "Smooth functions on the key-frame");
+  command->add_option("--clusters", codec.clusters, "Key-frames (profile paper)");
+  command->add_option("--multi-resolution", codec.coarse_vertices,
+                      "Code about so many vertices (10000, say); the others follow them");
+  command->add_option("--rate", options->rate_hz, "Frames a second, where the files do not tell");
+  command->add_flag("--json", options->json, "Print the figures as one JSON object");
+  command->callback([options, &session] { run_encode(*options, session); });
+}
+
+void add_mesh_decode(CLI::App& mesh, Session& session) {
+  CLI::App* command = mesh.add_subcommand("decode", "Frames out of a stream, all or some");
+  const auto options = std::make_shared<DecodeOptions>();
+  const auto format = std::make_shared<std::string>("npy");
+  command->add_option("IN", options->stream, "The stream (.ksm)")->required();
+  command->add_option("-o,--output", options->output, "A folder, or a .glb or .gltf file")->required();
+  command->add_option("--format", *format, "Of the folder's files: npy, obj or ply")
+      ->check(CLI::IsMember({"npy", "obj", "ply"}))
+      ->capture_default_str();
+  command->add_option("--from", options->from, "The first frame (0)");
+  command->add_option("--to", options->to, "The last frame");
+  command->add_flag("--json", options->json, "Print the figures as one JSON object");
+  command->callback([options, format, &session] { run_decode(*options, *format, session); });
+}
+
+void add_mesh_compare(CLI::App& mesh) {
+  CLI::App* command = mesh.add_subcommand("compare", "How far mesh sequence B is from the reference A");
+  const auto options = std::make_shared<CompareOptions>();
+  command->add_option("A", options->reference, "The reference: files or a stream")->required();
+  command->add_option("B", options->other, "The sequence to judge: files or a stream")->required();
+  command->add_option("--picture", options->picture, "Draw original, decoded and error (blue to red) to this PNG");
+  command->add_option("--frame", options->frame, "The frame to draw; by default the one with the largest error");
+  command->add_flag("--json", options->json, "Print the measures as one JSON object");
+  command->callback([options] { run_compare(*options); });
+}
+
+void add_mesh_info(CLI::App& mesh) {
+  CLI::App* command = mesh.add_subcommand("info", "What a mesh sequence or a stream of one holds");
+  const auto options = std::make_shared<InfoOptions>();
+  command->add_option("FILE", options->file, "Files of a sequence, or a stream")->required();
+  command->add_flag("--json", options->json, "Print the result as one JSON object");
+  command->callback([options] { run_info(*options); });
+}
+
+}  // namespace
+
+void add_mesh(CLI::App& app, Session& session) {
+  CLI::App* mesh = app.add_subcommand("mesh", "Animated meshes: encode, decode, compare, info");
+  mesh->require_subcommand(1);
+  add_mesh_encode(*mesh, session);
+  add_mesh_decode(*mesh, session);
+  add_mesh_compare(*mesh);
+  add_mesh_info(*mesh);
+}
+
+}  // namespace kinespace::cli
