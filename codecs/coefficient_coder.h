@@ -32,6 +32,11 @@ inline constexpr std::array<int, layer_count + 1> layer_bands{0, 5, 8, 11, 13, b
 // First function of each band (and the end) in a block of so many functions, `points` points long, at a frame rate.
 [[nodiscard]] std::array<int, band_count + 1> band_edges(int functions, int points, double rate_hz);
 
+struct CodingStatistics;
+
+// Coefficients below this, in steps, will be coded as zero whatever stands around them.
+inline constexpr double surely_zero = 0.62;
+
 // Levels by component and band.
 struct Spectrum {
   static constexpr int levels = 14;  // 0: empty; then mean magnitudes below 2^-8, 2^-7, .. 2^3, and above
@@ -44,6 +49,7 @@ struct Spectrum {
   // The functions that a block needs: the end of the last band that any component fills.
   [[nodiscard]] int functions_used(const std::array<int, band_count + 1>& edges) const;
   [[nodiscard]] static std::uint8_t level_of(double mean_magnitude);
+  [[nodiscard]] static Spectrum of(const CodingStatistics& statistics, int components);
 };
 
 [[nodiscard]] Bytes pack_spectrum(const Spectrum& spectrum);
@@ -101,6 +107,9 @@ struct CodingStatistics {
   double squared_error = 0;                                                       // in squared steps
 
   void add(const CodingStatistics& other);
+  // Counts what plain rounding would give of a block of so many points, which is where the spectrum starts from.
+  // `wanted`: [component][functions], in steps.
+  void add_plain(std::span<const double> wanted, int functions, int points, double rate_hz, int components);
   [[nodiscard]] ReconstructionPoints reconstruction() const;
 };
 

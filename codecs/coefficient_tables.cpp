@@ -203,4 +203,32 @@ LearnedStart unpack_start(std::span<const std::byte> bytes, const std::string& s
   return out;
 }
 
+Spectrum Spectrum::of(const CodingStatistics& statistics, int components) {
+  Spectrum out{.components = components, .level = {}};
+  for (std::size_t i = 0; i < static_cast<std::size_t>(components) * band_count; ++i) {
+    const double count = i < statistics.coefficients.size() ? statistics.coefficients[i] : 0;
+    out.level.push_back(count > 0 ? level_of(statistics.magnitude[i] / count) : std::uint8_t{0});
+  }
+  return out;
+}
+
+void CodingStatistics::add_plain(std::span<const double> wanted, int functions, int points, double rate_hz,
+                                 int components) {
+  magnitude.resize(static_cast<std::size_t>(components) * band_count);
+  coefficients.resize(magnitude.size());
+  const auto edges = band_edges(points, points, rate_hz);
+  for (int c = 0; c < components; ++c) {
+    const auto row = wanted.subspan(static_cast<std::size_t>(c) * static_cast<std::size_t>(functions),
+                                    static_cast<std::size_t>(functions));
+    for (std::size_t band = 0; band < band_count; ++band) {
+      const std::size_t cell = static_cast<std::size_t>(c) * band_count + band;
+      for (int k = edges[band]; k < std::min(edges[band + 1], functions); ++k) {
+        const double size = std::abs(row[static_cast<std::size_t>(k)]);
+        if (size > surely_zero) magnitude[cell] += std::floor(size + 0.5);
+      }
+      coefficients[cell] += edges[band + 1] - edges[band];
+    }
+  }
+}
+
 }  // namespace kinespace

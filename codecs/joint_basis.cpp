@@ -85,6 +85,22 @@ JointBasis unpack_basis(std::span<const std::byte> bytes, int dimensions, int co
   return out;
 }
 
+JointBasis sent_basis(const KarhunenLoeve& exact, std::span<const int> kept, double step,
+                      const Eigen::MatrixXd& lower) {
+  constexpr int coarsest_exponent = 5;
+  constexpr int finest_exponent = 20;
+  constexpr int extra_exponent = 6;
+  Eigen::MatrixXd basis(exact.basis.rows(), static_cast<Eigen::Index>(kept.size()));
+  std::vector<int> exponents;
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    basis.col(static_cast<Eigen::Index>(i)) = exact.basis.col(kept[i]);
+    const double rms = std::sqrt(exact.energy(kept[i]));
+    const auto wanted = static_cast<int>(std::ceil(std::log2(std::max(rms / step, 1e-3)))) + extra_exponent;
+    exponents.push_back(std::clamp(wanted, coarsest_exponent, finest_exponent));
+  }
+  return quantise_basis(lower.transpose() * basis, exponents);
+}
+
 KarhunenLoeve karhunen_loeve(const Eigen::MatrixXd& metric, const Eigen::MatrixXd& second_moments) {
   const Eigen::LLT<Eigen::MatrixXd> factor(metric);
   const Eigen::MatrixXd lower = factor.matrixL();

@@ -41,6 +41,11 @@ struct KarhunenLoeve {
   Eigen::MatrixXd basis;   // B, dimensions x dimensions: B' M B = I, columns by falling energy
   Eigen::VectorXd energy;  // mean square of each component
 };
+// Columns `kept` of the exact basis as V is sent, for a quantiser of that step: fine enough that a component of that
+// energy leaks less than a step into the others, and never so coarse that columns of unit length lose their shape.
+// `lower`: L0.
+[[nodiscard]] JointBasis sent_basis(const KarhunenLoeve& exact, std::span<const int> kept, double step,
+                                    const Eigen::MatrixXd& lower);
 [[nodiscard]] KarhunenLoeve karhunen_loeve(const Eigen::MatrixXd& metric, const Eigen::MatrixXd& second_moments);
 
 // The least squares projection onto B in the metric M: z = P x.

@@ -12,12 +12,7 @@
 namespace kinespace {
 namespace {
 
-// The basis is sent in steps of 2^-exponent: fine enough that a component of that energy leaks less than a step into
-// the others, and never so coarse that columns of unit length lose their shape.
-constexpr int coarsest_exponent = 5;
-constexpr int extra_exponent = 6;
 constexpr std::size_t windows_at_once = 16;
-constexpr double unlikely = 0.62;  // steps; what is smaller will be coded as zero
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -59,7 +54,7 @@ Eigen::VectorXd MotionSpaceEncoder::gains(double step, const WindowLayout& layou
       for (Eigen::Index c = 0; c < d; ++c) {
         for (Eigen::Index k = 0; k < z.cols(); ++k) {
           const double square = z(c, k) * z(c, k);
-          if (square > unlikely * unlikely) parts[part](c) += square - 1.0 / 12 - worth * bits_of_value;
+          if (square > surely_zero * surely_zero) parts[part](c) += square - 1.0 / 12 - worth * bits_of_value;
         }
       }
     }
@@ -79,43 +74,9 @@ void MotionSpaceEncoder::choose_basis(const WindowLayout& layout, std::span<cons
   for (int c = 0; c < d; ++c) {
     if (all || gain(c) > 0) kept.push_back(c);
   }
-  Eigen::MatrixXd basis(d, static_cast<Eigen::Index>(kept.size()));
-  std::vector<int> exponents;
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    basis.col(static_cast<Eigen::Index>(i)) = exact_.basis.col(kept[i]);
-    const double rms = std::sqrt(exact_.energy(kept[i]));
-    exponents.push_back(std::max(coarsest_exponent,
-                                 static_cast<int>(std::ceil(std::log2(std::max(rms / step, 1e-3)))) + extra_exponent));
-  }
-  const std::vector<double> rest(static_cast<std::size_t>(d), 0.0);
-  const Eigen::MatrixXd lower =
-      fixed_cholesky(pose_metric(table_.skeletons.front(), reference_, rest).lifted(tables.shell_weight));
-  tables.basis = quantise_basis(lower.transpose() * basis, exponents);
+  tables.basis =
+      sent_basis(exact_, kept, step, metric_at_rest(tables.reference, table_.skeletons.front(), tables.shell_weight));
 }
-
-namespace {
-
-// Counts what plain rounding would give, which is where the spectrum starts from. `wanted`: [component][functions].
-void add_plain(std::span<const double> wanted, int functions, const WindowPlace& window, double rate_hz, int components,
-               CodingStatistics& sums) {
-  sums.magnitude.resize(static_cast<std::size_t>(components) * band_count);
-  sums.coefficients.resize(sums.magnitude.size());
-  const auto edges = band_edges(window.points, window.points, rate_hz);
-  for (int c = 0; c < components; ++c) {
-    const auto row = wanted.subspan(static_cast<std::size_t>(c) * static_cast<std::size_t>(functions),
-                                    static_cast<std::size_t>(functions));
-    for (std::size_t band = 0; band < band_count; ++band) {
-      const std::size_t cell = static_cast<std::size_t>(c) * band_count + band;
-      for (int k = edges[band]; k < std::min(edges[band + 1], functions); ++k) {
-        const double size = std::abs(row[static_cast<std::size_t>(k)]);
-        if (size > unlikely) sums.magnitude[cell] += std::floor(size + 0.5);
-      }
-      sums.coefficients[cell] += edges[band + 1] - edges[band];
-    }
-  }
-}
-
-}  // namespace
 
 // The state of one attempt.
 struct MotionSpaceEncoder::Coding {
@@ -130,19 +91,6 @@ struct MotionSpaceEncoder::Coding {
     return out;
   }
 };
-
-namespace {
-
-Spectrum spectrum_of(const CodingStatistics& statistics, int components) {
-  Spectrum out{.components = components, .level = {}};
-  for (std::size_t i = 0; i < static_cast<std::size_t>(components) * band_count; ++i) {
-    const double count = i < statistics.coefficients.size() ? statistics.coefficients[i] : 0;
-    out.level.push_back(count > 0 ? Spectrum::level_of(statistics.magnitude[i] / count) : std::uint8_t{0});
-  }
-  return out;
-}
-
-}  // namespace
 
 void MotionSpaceEncoder::code_groups(Coding& coding, const MotionSpaceSettings& settings, bool measure) const {
   Attempt& a = coding.attempt;
@@ -233,13 +181,13 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
       const Eigen::Map<const RowMatrix> all(coefficients_[w].data(), reference_.dimensions(), window.points);
       RowMatrix& wanted = coding.wanted[w];
       wanted.noalias() = (factor * projection) * all.leftCols(functions);
-      add_plain({wanted.data(), static_cast<std::size_t>(wanted.size())}, functions, window,
-                a.clips.clips[static_cast<std::size_t>(window.clip)].rate_hz, components, plain[part]);
+      plain[part].add_plain({wanted.data(), static_cast<std::size_t>(wanted.size())}, functions, window.points,
+                            a.clips.clips[static_cast<std::size_t>(window.clip)].rate_hz, components);
     }
   });
   CodingStatistics first;
   for (const CodingStatistics& one : plain) first.add(one);
-  a.tables.coding.spectrum = spectrum_of(first, components);
+  a.tables.coding.spectrum = Spectrum::of(first, components);
   if (learned != nullptr && basis_ == nullptr) {
     a.tables.coding.start = learned->tables.coding.start;
     a.tables.coding.points = learned->tables.coding.points;
@@ -249,7 +197,7 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
   CodingStatistics total = coding.total();
   if (!estimate) {
     // Once more with what was learned.
-    a.tables.coding.spectrum = spectrum_of(total, components);
+    a.tables.coding.spectrum = Spectrum::of(total, components);
   }
   if (basis_ == nullptr) {
     a.tables.coding.start = total.counts.learn();

@@ -23,24 +23,6 @@ Curves curves_of(const PoseVectors& vectors, int dimensions) {
   return {vectors.values.data(), dimensions, vectors.frames};
 }
 
-// Frames where a body is suddenly elsewhere: in whitened curves the distance from frame to frame is that of the joints
-// together, in cm.
-std::vector<int> find_jumps(const RowMatrix& curves, std::vector<int> jumps) {
-  constexpr double break_cm = 10;
-  constexpr double break_ratio = 4;
-  const Eigen::Index n = curves.cols();
-  std::vector<double> travel(static_cast<std::size_t>(n), 0.0);
-  for (Eigen::Index f = 1; f < n; ++f) travel[static_cast<std::size_t>(f)] = (curves.col(f) - curves.col(f - 1)).norm();
-  for (std::size_t f = 1; f < travel.size(); ++f) {
-    const double before = f > 1 ? travel[f - 1] : 0;
-    const double after = f + 1 < travel.size() ? travel[f + 1] : 0;
-    if (travel[f] > break_cm && travel[f] > break_ratio * std::max(before, after)) jumps.push_back(static_cast<int>(f));
-  }
-  std::ranges::sort(jumps);
-  jumps.erase(std::unique(jumps.begin(), jumps.end()), jumps.end());
-  return jumps;
-}
-
 std::vector<int> equal_windows(int frames, int wanted) {
   const int count = std::max(1, (frames + wanted / 2) / wanted);
   std::vector<int> out;

@@ -176,11 +176,14 @@ std::shared_ptr<const NaturalFunctions> FunctionTables::get(int points, int func
   return tables_.emplace(key, std::make_shared<const NaturalFunctions>(points, functions)).first->second;
 }
 
-WindowSynthesis::WindowSynthesis(const MotionSpaceTables& tables, const Skeleton& skeleton) : step_(tables.step) {
-  const std::vector<double> rest(static_cast<std::size_t>(tables.reference.dimensions()), 0.0);
-  const Eigen::MatrixXd metric = pose_metric(skeleton, tables.reference, rest).lifted(tables.shell_weight);
-  basis_ = solve_transposed(fixed_cholesky(metric), tables.basis.mixing());
+Eigen::MatrixXd metric_at_rest(const ReferencePose& reference, const Skeleton& skeleton, double shell_weight) {
+  const std::vector<double> rest(static_cast<std::size_t>(reference.dimensions()), 0.0);
+  return fixed_cholesky(pose_metric(skeleton, reference, rest).lifted(shell_weight));
 }
+
+WindowSynthesis::WindowSynthesis(const MotionSpaceTables& tables, const Skeleton& skeleton)
+    : basis_(solve_transposed(metric_at_rest(tables.reference, skeleton, tables.shell_weight), tables.basis.mixing())),
+      step_(tables.step) {}
 
 void WindowSynthesis::synthesise(const WindowPlace& window, std::span<const double> values, std::span<double> out,
                                  Scratch& scratch) const {

@@ -70,6 +70,10 @@ class FunctionTables {
   std::size_t bytes_ = 0;
 };
 
+// L0: the Cholesky factor of the position metric at the reference pose, as every reader computes it.
+[[nodiscard]] Eigen::MatrixXd metric_at_rest(const ReferencePose& reference, const Skeleton& skeleton,
+                                             double shell_weight);
+
 // From coefficients in quantiser steps to pose vectors. Same bits on every machine.
 class WindowSynthesis {
  public:

@@ -9,6 +9,8 @@
 
 #include "base/progress.h"
 #include "codecs/clip_error.h"
+#include "codecs/joint_basis.h"
+#include "codecs/rma/contact_trajectories.h"
 #include "codecs/rma/markers.h"
 #include "codecs/rma/repeat_stream.h"
 #include "codecs/rma/repeats.h"
@@ -22,6 +24,9 @@ struct RepeatAttempt {
   std::vector<Bytes> groups;
   ClipErrorSums error;
 };
+
+// Slow joints only, and no step of theirs that the eye would miss: half of the bytes of the paper's rule.
+inline constexpr ContactOptions slow_contacts{.near_cm = 0, .still_cm = 0.6};
 
 class RepeatEncoder {
  public:
@@ -49,6 +54,7 @@ class RepeatEncoder {
   [[nodiscard]] WindowPrediction candidate(std::size_t w) const;
   [[nodiscard]] std::vector<double> predicted_from_originals(std::size_t w, const WindowPrediction& prediction) const;
   void choose_basis(double step, MotionSpaceTables& tables) const;
+  [[nodiscard]] std::vector<double> own_vectors(std::size_t w) const;
   // Coefficients of vectors [dimension][points] under a projection: [component][functions of the window].
   [[nodiscard]] std::vector<double> analyse(std::size_t w, std::span<const double> vectors,
                                             const Eigen::MatrixXd& projection) const;
@@ -63,8 +69,7 @@ class RepeatEncoder {
   RepeatAnalysis analysis_;
   std::vector<std::int64_t> starts_;  // by clip: its first frame in the analysis
   Eigen::MatrixXd metric_;
-  Eigen::MatrixXd basis_;  // exact
-  Eigen::VectorXd energy_;
+  KarhunenLoeve exact_;
   // By plan.
   std::vector<WindowPlace> windows_;
   std::vector<std::size_t> first_of_clip_;
