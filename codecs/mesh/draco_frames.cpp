@@ -72,8 +72,8 @@ Bytes stream_on(const MeshSequence& mesh, const std::vector<Triangle>& triangles
   out.add_section("setup", std::move(setup).take());
   out.add_section("order", frames[0].order);
   for (std::size_t f = 0; f < frames.size(); ++f) {
-    out.add_section("f" + std::to_string(f), frames[f].surface);
-    if (frames[f].order != frames[0].order) out.add_section("o" + std::to_string(f), frames[f].order);
+    out.add_section(fmt::format("f{}", f), frames[f].surface);
+    if (frames[f].order != frames[0].order) out.add_section(fmt::format("o{}", f), frames[f].order);
   }
   return out.finish();
 }
@@ -96,10 +96,10 @@ class DracoReader final : public MeshStreamReader {
 
  private:
   [[nodiscard]] KeyMesh unpacked(int f) const {
-    const std::string number = std::to_string(f);
-    const std::string own = "o" + number;
-    return unpack_key_mesh(stream_.section("f" + number), stream_.section(stream_.has_section(own) ? own : "order"),
-                           described_.vertices, described_.triangles, 1, stream_.source());
+    const std::string own = fmt::format("o{}", f);
+    return unpack_key_mesh(stream_.section(fmt::format("f{}", f)),
+                           stream_.section(stream_.has_section(own) ? own : "order"), described_.vertices,
+                           described_.triangles, 1, stream_.source());
   }
   Bitstream stream_;
   MeshLayout described_;

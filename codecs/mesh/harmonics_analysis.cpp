@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
 #include "codecs/mesh/measured_mesh.h"
@@ -166,8 +167,8 @@ Bytes HarmonicsAnalysis::stream_of(const Attempt& attempt, const MeshError& erro
   if (decimation_) add_decimation(out, *decimation_);
   out.add_section("rigid", track_bytes_);
   for (std::size_t b = 0; b < attempt.motion.size(); ++b) {
-    out.add_section("m" + std::to_string(b), attempt.motion[b]);
-    out.add_section("d" + std::to_string(b), attempt.detail[b]);
+    out.add_section(fmt::format("m{}", b), attempt.motion[b]);
+    out.add_section(fmt::format("d{}", b), attempt.detail[b]);
   }
   return out.finish();
 }

@@ -2,6 +2,8 @@
 #include <algorithm>
 #include <chrono>
 
+#include <fmt/format.h>
+
 #include "base/error.h"
 #include "codecs/mesh/harmonics_stream.h"
 
@@ -52,11 +54,11 @@ class HarmonicsReader final : public MeshStreamReader {
     std::int64_t room = most_numbers(stream_.size());  // for all blocks together
     for (int b = 0; b < split.count(); ++b) {
       const std::string number = std::to_string(b);
-      const MovingPart motion = decode_part(stream_.section("m" + number), split.size(b), space.function_graph(),
-                                            setup.step, room, stream_.source());
+      const MovingPart motion = decode_part(stream_.section(fmt::format("m{}", number)), split.size(b),
+                                            space.function_graph(), setup.step, room, stream_.source());
       room -= motion.functions.cols() * space.vertices() * 3;
-      MovingPart detail = decode_part(stream_.section("d" + number), split.size(b), space.vertex_graph(), setup.step,
-                                      std::max<std::int64_t>(room, 0), stream_.source());
+      MovingPart detail = decode_part(stream_.section(fmt::format("d{}", number)), split.size(b), space.vertex_graph(),
+                                      setup.step, std::max<std::int64_t>(room, 0), stream_.source());
       room -= detail.functions.cols() * space.vertices() * 3;
       if (room < 0) {
         throw Error(ErrorKind::bad_input, {.file = stream_.source(),

@@ -28,14 +28,14 @@ namespace kinespace {
 namespace {
 
 constexpr double usual_kg = 1;
-constexpr double key_steps = 1.2;  // step of the key-frames over the root mean square error a coordinate
+constexpr double key_steps = 0.5;  // step of the key-frames over the root mean square error a coordinate
 
 // A key-frame and what follows from it.
 class Cluster {
  public:
   Cluster(Points key, std::span<const Triangle> triangles, int functions)
       : Cluster(key, triangles,
-                manifold_harmonics(key, triangles, {.functions = functions, .area_weighted = true}).functions) {}
+                manifold_harmonics(key, triangles, {.functions = functions, .tolerance = 1e-7}).functions) {}
 
   [[nodiscard]] std::uint64_t checksum() const { return checksum_; }
   [[nodiscard]] const Projection& projection() const { return projection_; }
@@ -168,6 +168,8 @@ class PaperReader final : public MeshStreamReader {
     KeyMesh mesh = unpack_key_mesh(stream_.section("surface"), stream_.section("order"), setup.layout.vertices,
                                    setup.layout.triangles, setup.clusters, stream_.source());
     const Clusters clusters = unpack_clusters(stream_.section("clusters"), setup, stream_.source());
+    frames_.track = unpack_track(stream_.section("rigid"), setup.layout.frames, setup.size, stream_.source());
+    frames_.cluster_of = clusters.of;
     const auto start = std::chrono::steady_clock::now();
     for (int j = 0; j < setup.clusters; ++j) {
       const auto number = static_cast<std::size_t>(j);
@@ -181,8 +183,6 @@ class PaperReader final : public MeshStreamReader {
       }
     }
     basis_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    frames_.track = unpack_track(stream_.section("rigid"), setup.layout.frames, setup.size, stream_.source());
-    frames_.cluster_of = clusters.of;
     read_rows(members_of(clusters), setup);
     layout_ = empty_sequence(setup.layout, std::move(mesh.triangles));
   }
@@ -200,9 +200,9 @@ class PaperReader final : public MeshStreamReader {
     const std::size_t width = static_cast<std::size_t>(setup.functions) * 3;
     for (std::size_t j = 0; j < members.size(); ++j) {
       const std::string number = std::to_string(j);
-      const auto table = decode_prediction(stream_.section("a" + number), stream_.section("q" + number),
-                                           frames_.clusters[j]->key_row(), static_cast<int>(members[j].size()),
-                                           setup.step, stream_.source());
+      const auto table = decode_prediction(stream_.section(fmt::format("a{}", number)),
+                                           stream_.section(fmt::format("q{}", number)), frames_.clusters[j]->key_row(),
+                                           static_cast<int>(members[j].size()), setup.step, stream_.source());
       for (std::size_t i = 0; i < members[j].size(); ++i) {
         const auto from = table.begin() + static_cast<std::ptrdiff_t>(i * width);
         frames_.rows[static_cast<std::size_t>(members[j][i])].assign(from, from + static_cast<std::ptrdiff_t>(width));
@@ -275,8 +275,8 @@ class Encoder {
     out.add_section("rigid", pack_track(frames_.track));
     out.add_section("clusters", pack_clusters(clusters_));
     for (std::size_t j = 0; j < attempt.parts.size(); ++j) {
-      out.add_section("a" + std::to_string(j), attempt.parts[j].coefficients);
-      out.add_section("q" + std::to_string(j), attempt.parts[j].misses);
+      out.add_section(fmt::format("a{}", j), attempt.parts[j].coefficients);
+      out.add_section(fmt::format("q{}", j), attempt.parts[j].misses);
     }
     return {.stream = out.finish(), .kg = error.kg};
   }
@@ -361,7 +361,7 @@ double spread_of(const MeshSequence& mesh) {
 std::vector<std::array<int, 2>> choices(const MeshSequence& mesh, const MeshCodecOptions& options) {
   std::vector<std::array<int, 2>> out;
   for (const auto& [functions, clusters] :
-       {std::array{400, 1}, std::array{800, 1}, std::array{800, 2}, std::array{800, 4}}) {
+       {std::array{400, 1}, std::array{400, 2}, std::array{600, 2}, std::array{600, 4}}) {
     const std::array next{std::min(options.bases > 0 ? options.bases : functions, mesh.vertices),
                           std::min(options.clusters > 0 ? options.clusters : clusters, mesh.frames)};
     if (out.empty() || out.back() != next) out.push_back(next);

@@ -113,8 +113,8 @@ class Coder {
     out.add_section("surface", packed_.surface);
     out.add_section("order", packed_.order);
     for (std::size_t b = 0; b < blocks.size(); ++b) {
-      out.add_section("b" + std::to_string(b), blocks[b].basis_bytes);
-      out.add_section("w" + std::to_string(b), blocks[b].weight_bytes);
+      out.add_section(fmt::format("b{}", b), blocks[b].basis_bytes);
+      out.add_section(fmt::format("w{}", b), blocks[b].weight_bytes);
     }
     return out.finish();
   }
@@ -164,8 +164,9 @@ class PcaReader final : public MeshStreamReader {
     const auto kept = static_cast<int>(components);
     const std::string number = std::to_string(b);
     Block& block = blocks_.emplace_back();
-    block.paths = decode_frame_basis(stream_.section("b" + number), numbers, kept, stream_.source());
-    block.weights = unpack_weights(stream_.section("w" + number), kept, described.vertices, walk, stream_.source());
+    block.paths = decode_frame_basis(stream_.section(fmt::format("b{}", number)), numbers, kept, stream_.source());
+    block.weights =
+        unpack_weights(stream_.section(fmt::format("w{}", number)), kept, described.vertices, walk, stream_.source());
   }
 
   Bitstream stream_;
@@ -193,8 +194,10 @@ Bytes encode_trajectory_pca(const MeshSequence& mesh, const MeshCodecOptions& op
     const auto inverse = [&](double fineness) {
       return static_cast<double>(coder.code(1 / fineness, tail(1 / fineness), false).stream.size());
     };
+    constexpr double lr_bytes = 16;  // which the streams of the search do not tell
     const double guess = 1 / std::max(std::sqrt(spread / numbers) * 0.05, least);
-    const double fineness = largest_step(guess, guess * 1e-5, static_cast<double>(*options.bytes), 0.01, 14, inverse);
+    const double fineness =
+        largest_step(guess, guess * 1e-5, static_cast<double>(*options.bytes) - lr_bytes, 0.01, 14, inverse);
     if (fineness == 0) {
       throw Error(ErrorKind::usage, {.found = fmt::format("{} bytes for the stream", *options.bytes),
                                      .expected = "more for this sequence"});
