@@ -1,0 +1,132 @@
+// Streams of mesh sequences with any bytes in them: an error that names the file, or frames; never more memory than the
+// stream's size explains.
+#include <cmath>
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "codecs/mesh/mesh_codec.h"
+#include "tests/codecs/forged_stream.h"
+#include "tests/mesh/sample_meshes.h"
+#include "tests/support/allocation_meter.h"
+
+namespace kinespace::test {
+namespace {
+
+constexpr std::size_t base_memory = std::size_t{64} << 20;
+constexpr std::size_t memory_a_byte = 16;
+
+bool decodes(std::span<const std::byte> bytes) {
+  const AllocationMeter meter;
+  bool good = false;
+  std::size_t frame_bytes = 0;
+  try {
+    const auto reader = open_mesh_stream(bytes, "damaged.ksm");
+    frame_bytes = reader->layout().frame_size() * sizeof(double);
+    const int frames = reader->layout().frames;
+    for (int f = 0; f < frames; f += 1 + frames / 50) {
+      EXPECT_TRUE(reader->frame(f).allFinite());
+    }
+    good = true;
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::bad_input) << error.what();
+    EXPECT_NE(std::string(error.what()).find("damaged.ksm"), std::string::npos) << error.what();
+  }
+  EXPECT_LE(meter.peak(), memory_a_byte * bytes.size() + base_memory + 8 * frame_bytes);
+  return good;
+}
+
+struct Kind {
+  std::string name;
+  std::string codec;
+  MeshCodecOptions options;
+};
+const std::vector<Kind>& kinds() {
+  static const std::vector<Kind> all{
+      {"standard", "mesh-harmonics", {.kg = 1.0, .bases = 40}},
+      {"coarse", "mesh-harmonics", {.kg = 4.0, .bases = 40, .coarse_vertices = 120}},
+      {"paper", "mesh-harmonics", {.profile = MeshProfile::paper, .bases = 40, .clusters = 2}},
+      {"pca", "mesh-pca", {.kg = 1.0}},
+      {"draco", "mesh-draco", {.kg = 1.0}}};
+  return all;
+}
+
+class MeshDamage : public testing::TestWithParam<Kind> {
+ protected:
+  [[nodiscard]] static const Bytes& stream() {
+    static std::map<std::string, Bytes, std::less<>> made;
+    Bytes& out = made[GetParam().name];
+    if (out.empty()) {
+      const MeshSequence mesh = joined(bending_tube(200, 5, 1.0), sheet(6, 5, 5));
+      out = encode_mesh(GetParam().codec, mesh, GetParam().options);
+    }
+    return out;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(All, MeshDamage, testing::ValuesIn(kinds()), [](const auto& info) { return info.param.name; });
+
+TEST_P(MeshDamage, every_prefix_is_an_error) {
+  ASSERT_TRUE(decodes(stream()));
+  for (std::size_t n = 0; n < stream().size(); n += n < 64 ? 1 : 1 + stream().size() / 200) {
+    EXPECT_FALSE(decodes(std::span(stream()).first(n))) << n;
+  }
+}
+
+TEST_P(MeshDamage, every_flipped_byte_is_noticed) {
+  Bytes changed = stream();
+  for (std::size_t n = 0; n < changed.size(); n += n < 64 ? 1 : 1 + changed.size() / 200) {
+    changed[n] ^= std::byte{0x04};
+    EXPECT_FALSE(decodes(changed)) << n;
+    changed[n] ^= std::byte{0x04};
+  }
+  changed.push_back(std::byte{0});
+  EXPECT_FALSE(decodes(changed));
+}
+
+// Draco's part among them.
+TEST_P(MeshDamage, forged_parts_with_fitting_checksums_are_errors_or_frames) {
+  ASSERT_TRUE(decodes(forged(stream(), "", {})));
+  const std::size_t steps = GetParam().name == "paper" ? 8 : 40;  // each opening solves eigenproblems
+  int errors = 0;
+  for (const std::string& name : parts_of(stream())) {
+    const Bytes whole = part(stream(), name);
+    for (std::size_t n = 0; n < whole.size(); n += 1 + whole.size() / steps) {
+      for (const auto mask : {std::byte{0x21}, std::byte{0x80}, std::byte{0xff}}) {
+        Bytes changed = whole;
+        changed[n] ^= mask;
+        errors += decodes(forged(stream(), name, changed)) ? 0 : 1;
+      }
+      Bytes shorter = whole;
+      shorter.resize(n);
+      errors += decodes(forged(stream(), name, shorter)) ? 0 : 1;
+    }
+    errors += decodes(forged(stream(), name, Bytes(64, std::byte{0xff}))) ? 0 : 1;
+  }
+  EXPECT_GT(errors, 10);
+}
+
+TEST(MeshDamageOfBasis, a_checksum_that_does_not_match_is_an_error) {
+  const MeshSequence mesh = bending_tube(200, 5, 1.0);
+  const Bytes stream = encode_mesh("mesh-harmonics", mesh, {.profile = MeshProfile::paper, .bases = 30, .clusters = 1});
+  Bytes setup = part(stream, "setup");
+  setup.back() ^= std::byte{1};  // the checksum stands last
+  const Bytes other = forged(stream, "setup", setup);
+  try {
+    static_cast<void>(open_mesh_stream(other, "s"));
+    ADD_FAILURE() << "decoded";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+    EXPECT_NE(std::string(error.what()).find("checksum"), std::string::npos) << error.what();
+  }
+}
+
+TEST(MeshDamageOfBasis, streams_of_other_kinds_are_refused) {
+  BitstreamWriter writer("codec:qbc");
+  const Bytes stream = writer.finish();
+  EXPECT_FALSE(is_mesh_stream(stream));
+  EXPECT_THROW(static_cast<void>(open_mesh_stream(stream, "s")), Error);
+}
+
+}  // namespace
+}  // namespace kinespace::test
