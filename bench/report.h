@@ -60,7 +60,7 @@ struct BenchReport {
 struct BenchOptions {
   // Instead of what the bench takes from `data`, where it can: bench codecs.
   std::vector<std::filesystem::path> clips;
-  std::filesystem::path data;                   // folder with cmu/, bandai1/, bandai2/
+  std::filesystem::path data;                   // folder with cmu/, bandai1/, bandai2/, mesh/
   std::optional<std::filesystem::path> golden;  // folder of golden FPCA cases
   std::string device = "auto";
 };
@@ -93,6 +93,7 @@ struct Bench {
 [[nodiscard]] BenchReport bench_fpca(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_io(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_kernels(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_mesh(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_playback(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_retrieval(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_rma(const BenchOptions& options);
