@@ -51,7 +51,7 @@ class HarmonicsReader final : public MeshStreamReader {
  private:
   void read_blocks(const HarmonicsSpace& space, const HarmonicsSetup& setup) {
     const FrameBlocks split{setup.layout.frames};
-    std::int64_t room = most_numbers(stream_.size());  // for all blocks together
+    std::int64_t room = most_mesh_numbers(stream_.size());  // for all blocks together
     for (int b = 0; b < split.count(); ++b) {
       const std::string number = std::to_string(b);
       const MovingPart motion = decode_part(stream_.section(fmt::format("m{}", number)), split.size(b),

@@ -51,7 +51,7 @@ HarmonicsSetup get_setup(std::span<const std::byte> bytes, std::uint64_t stream_
   const std::uint64_t coded = decimated ? coarse : static_cast<std::uint64_t>(out.layout.vertices);
   const std::uint64_t triangles = decimated ? get_varint(in) : 0;
   if (rotate > 1 || functions < 1 || coded > static_cast<std::uint64_t>(out.layout.vertices) || functions > coded ||
-      functions * coded > static_cast<std::uint64_t>(most_numbers(stream_bytes)) ||
+      functions * coded > static_cast<std::uint64_t>(most_mesh_numbers(stream_bytes)) ||
       triangles > static_cast<std::uint64_t>(out.layout.triangles)) {
     in.fail(std::to_string(functions) + " functions on " + std::to_string(coded) + " vertices",
             "what the encoder writes (damaged)");

@@ -20,7 +20,7 @@ std::int64_t get_limited(ByteReader& in, std::int64_t least, std::int64_t most, 
 
 }  // namespace
 
-std::int64_t most_numbers(std::uint64_t stream_bytes) {
+std::int64_t most_mesh_numbers(std::uint64_t stream_bytes) {
   return (std::int64_t{1} << 21) + 1024 * static_cast<std::int64_t>(std::min<std::uint64_t>(stream_bytes, 1U << 20U));
 }
 

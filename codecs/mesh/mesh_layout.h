@@ -30,7 +30,7 @@ void put_layout(ByteWriter& out, const MeshLayout& layout);
 [[nodiscard]] MeshSequence empty_sequence(const MeshLayout& layout, std::vector<Triangle> triangles);
 
 // How many numbers a stream of so many bytes may stand for in memory, in any one table.
-[[nodiscard]] std::int64_t most_numbers(std::uint64_t stream_bytes);
+[[nodiscard]] std::int64_t most_mesh_numbers(std::uint64_t stream_bytes);
 
 // x = origin + step * q.
 struct Grid {

@@ -106,7 +106,7 @@ Setup get_setup(std::span<const std::byte> bytes, std::uint64_t stream_bytes, co
   const std::uint64_t functions = get_varint(in), clusters = get_varint(in);
   const auto vertices = static_cast<std::uint64_t>(out.layout.vertices);
   const auto frames = static_cast<std::uint64_t>(out.layout.frames);
-  const auto most = static_cast<std::uint64_t>(most_numbers(stream_bytes));
+  const auto most = static_cast<std::uint64_t>(most_mesh_numbers(stream_bytes));
   if (functions < 1 || functions > vertices || clusters < 1 || clusters > frames ||
       clusters > most / (functions * vertices) + (functions * vertices > most ? 0U : 1U) ||
       functions * vertices > most || functions * frames > most) {

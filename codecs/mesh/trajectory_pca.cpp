@@ -158,7 +158,7 @@ class PcaReader final : public MeshStreamReader {
     const std::uint64_t components = get_varint(in);
     const int numbers = 3 * split_.size(b);
     if (components > static_cast<std::uint64_t>(numbers) ||
-        static_cast<std::int64_t>(components) * described.vertices > most_numbers(stream_.size())) {
+        static_cast<std::int64_t>(components) * described.vertices > most_mesh_numbers(stream_.size())) {
       in.fail(std::to_string(components) + " components", "what the encoder writes (damaged)");
     }
     const auto kept = static_cast<int>(components);

@@ -14,9 +14,9 @@ namespace {
 constexpr std::int64_t block_frames = 512;
 
 // Ranges cut into blocks of a size that does not depend on the machine.
-std::vector<FrameRange> blocks_of(std::span<const FrameRange> ranges) {
-  std::vector<FrameRange> out;
-  for (const FrameRange& range : ranges) {
+std::vector<FrameSpan> blocks_of(std::span<const FrameSpan> ranges) {
+  std::vector<FrameSpan> out;
+  for (const FrameSpan& range : ranges) {
     for (std::int64_t first = range.first; first < range.last; first += block_frames) {
       out.push_back({first, std::min(first + block_frames, range.last)});
     }
@@ -32,7 +32,7 @@ struct Sums {
 
 class SumBody {
  public:
-  SumBody(const FrameTable& table, std::span<const FrameRange> blocks, const Eigen::VectorXd& origin)
+  SumBody(const FrameTable& table, std::span<const FrameSpan> blocks, const Eigen::VectorXd& origin)
       : table_(table), blocks_(blocks), origin_(origin) {
     clear();
   }
@@ -60,19 +60,19 @@ class SumBody {
   }
 
   const FrameTable& table_;
-  std::span<const FrameRange> blocks_;
+  std::span<const FrameSpan> blocks_;
   const Eigen::VectorXd& origin_;
   Sums sums_;
 };
 
 }  // namespace
 
-FrameMoments frame_moments(const FrameTable& table, std::span<const FrameRange> ranges) {
-  const std::vector<FrameRange> blocks = blocks_of(ranges);
+FrameMoments frame_moments(const FrameTable& table, std::span<const FrameSpan> ranges) {
+  const std::vector<FrameSpan> blocks = blocks_of(ranges);
   FrameMoments out;
   out.mean = Eigen::VectorXd::Zero(table.dimensions);
   out.covariance = Eigen::MatrixXd::Zero(table.dimensions, table.dimensions);
-  for (const FrameRange& block : blocks) out.count += block.frames();
+  for (const FrameSpan& block : blocks) out.count += block.frames();
   if (out.count == 0) return out;
 
   const Eigen::VectorXd origin = frame_matrix(table, {blocks.front().first, blocks.front().first + 1}).cast<double>();
@@ -99,7 +99,7 @@ PrincipalAxes principal_axes(const Eigen::MatrixXd& covariance) {
 }
 
 FrameTable reduced_table(const FrameTable& table, int dimensions) {
-  const FrameRange all{0, table.frames};
+  const FrameSpan all{0, table.frames};
   const FrameMoments moments = frame_moments(table, std::span(&all, 1));
   const PrincipalAxes principal = principal_axes(moments.covariance);
   FrameTable out{.rate_hz = table.rate_hz,
@@ -110,7 +110,7 @@ FrameTable reduced_table(const FrameTable& table, int dimensions) {
   out.values.resize(static_cast<std::size_t>(out.frames) * static_cast<std::size_t>(out.dimensions));
   const Eigen::MatrixXf axes = principal.axes.leftCols(out.dimensions).transpose().cast<float>();
   const Eigen::VectorXf mean = moments.mean.cast<float>();
-  const std::vector<FrameRange> blocks = blocks_of(std::span(&all, 1));
+  const std::vector<FrameSpan> blocks = blocks_of(std::span(&all, 1));
   tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
     const Eigen::MatrixXf centred = frame_matrix(table, blocks[b]).colwise() - mean;
     Eigen::Map<Eigen::MatrixXf>(out.values.data() + blocks[b].first * out.dimensions, out.dimensions,

@@ -17,7 +17,7 @@ struct FrameMoments {
   Eigen::MatrixXd covariance;  // [dimension][dimension], divided by count
 };
 
-[[nodiscard]] FrameMoments frame_moments(const FrameTable& table, std::span<const FrameRange> ranges);
+[[nodiscard]] FrameMoments frame_moments(const FrameTable& table, std::span<const FrameSpan> ranges);
 
 // Eigenvalues of a covariance, descending, none negative, and the vectors as columns; of each vector the number of
 // largest magnitude is positive.
@@ -29,7 +29,7 @@ struct PrincipalAxes {
 
 // The frames of ranges as a matrix: [dimension][frame].
 using FrameMatrix = Eigen::Map<const Eigen::MatrixXf>;
-[[nodiscard]] inline FrameMatrix frame_matrix(const FrameTable& table, FrameRange range) {
+[[nodiscard]] inline FrameMatrix frame_matrix(const FrameTable& table, FrameSpan range) {
   return {table.values.data() + range.first * table.dimensions, table.dimensions, range.frames()};
 }
 

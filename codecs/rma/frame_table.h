@@ -27,11 +27,11 @@ struct FrameTable {
 };
 
 // Frames first to last - 1.
-struct FrameRange {
+struct FrameSpan {
   std::int64_t first = 0;
   std::int64_t last = 0;  // exclusive
   [[nodiscard]] std::int64_t frames() const { return last - first; }
-  bool operator==(const FrameRange&) const = default;
+  bool operator==(const FrameSpan&) const = default;
 };
 
 }  // namespace kinespace

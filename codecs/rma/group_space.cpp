@@ -24,7 +24,7 @@ int chosen_axes(const Eigen::VectorXd& variances, double total, const AxisChoice
 
 }  // namespace
 
-GroupSpace fit_group_space(const FrameTable& table, std::span<const FrameRange> ranges, const AxisChoice& choice) {
+GroupSpace fit_group_space(const FrameTable& table, std::span<const FrameSpan> ranges, const AxisChoice& choice) {
   const FrameMoments moments = frame_moments(table, ranges);
   if (moments.count == 0) {
     throw Error(ErrorKind::usage, {.found = "a group without frames", .expected = "at least one frame"});
@@ -35,10 +35,10 @@ GroupSpace fit_group_space(const FrameTable& table, std::span<const FrameRange> 
   return {moments.mean, principal.axes.leftCols(count), principal.variances.head(count), total};
 }
 
-Eigen::MatrixXf GroupSpace::project(const FrameTable& table, std::span<const FrameRange> ranges) const {
+Eigen::MatrixXf GroupSpace::project(const FrameTable& table, std::span<const FrameSpan> ranges) const {
   std::vector<std::int64_t> column;
   std::int64_t frames = 0;
-  for (const FrameRange& range : ranges) {
+  for (const FrameSpan& range : ranges) {
     column.push_back(frames);
     frames += range.frames();
   }

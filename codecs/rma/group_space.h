@@ -22,7 +22,7 @@ struct GroupSpace {
   [[nodiscard]] int dimensions() const { return static_cast<int>(mean.size()); }
 
   // Coefficients of frames, [axis][frame], in the order of the ranges.
-  [[nodiscard]] Eigen::MatrixXf project(const FrameTable& table, std::span<const FrameRange> ranges) const;
+  [[nodiscard]] Eigen::MatrixXf project(const FrameTable& table, std::span<const FrameSpan> ranges) const;
   // mean + axes * coefficients: [dimension][frame].
   [[nodiscard]] Eigen::MatrixXd reconstruct(const Eigen::MatrixXd& coefficients) const;
 };
@@ -36,7 +36,7 @@ struct AxisChoice {
 
 // The space of the frames of the ranges; the same whatever the number of threads. Frames without any variance give one
 // axis. Throws Error{usage} when there is no frame.
-[[nodiscard]] GroupSpace fit_group_space(const FrameTable& table, std::span<const FrameRange> ranges,
+[[nodiscard]] GroupSpace fit_group_space(const FrameTable& table, std::span<const FrameSpan> ranges,
                                          const AxisChoice& choice = {});
 
 }  // namespace kinespace

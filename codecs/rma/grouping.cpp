@@ -85,8 +85,8 @@ void GroupingOptions::validate() const {
   require_option("refinements", refinements, 0, 100);
 }
 
-std::vector<FrameRange> Grouping::ranges(int wanted, const FrameTable& table) const {
-  std::vector<FrameRange> out;
+std::vector<FrameSpan> Grouping::ranges(int wanted, const FrameTable& table) const {
+  std::vector<FrameSpan> out;
   for (std::size_t s = 0; s < segments.size(); ++s) {
     if (group[s] != wanted) continue;
     const bool starts = std::binary_search(table.starts.begin(), table.starts.end(), segments[s].first);
@@ -99,7 +99,7 @@ std::vector<FrameRange> Grouping::ranges(int wanted, const FrameTable& table) co
   return out;
 }
 
-Grouping group_segments(const FrameTable& table, std::span<const FrameRange> segments, const GroupingOptions& options) {
+Grouping group_segments(const FrameTable& table, std::span<const FrameSpan> segments, const GroupingOptions& options) {
   options.validate();
   Grouping out;
   out.segments.assign(segments.begin(), segments.end());
@@ -112,7 +112,7 @@ Grouping group_segments(const FrameTable& table, std::span<const FrameRange> seg
   std::vector<FrameMoments> moments(segments.size());
   tbb::parallel_for(std::size_t{0}, segments.size(),
                     [&](std::size_t s) { moments[s] = frame_moments(reduced, segments.subspan(s, 1)); });
-  const FrameRange all{0, reduced.frames};
+  const FrameSpan all{0, reduced.frames};
   const FrameMoments total = frame_moments(reduced, std::span(&all, 1));
   const Eigen::MatrixXd embedding = normalised_cut_embedding(affinities(moments, total.mean, options), most);
 

@@ -33,16 +33,16 @@ struct GroupingOptions {
 };
 
 struct Grouping {
-  std::vector<FrameRange> segments;  // in time, as given
-  std::vector<int> group;            // of each segment; groups are numbered in the order of their first segments
+  std::vector<FrameSpan> segments;  // in time, as given
+  std::vector<int> group;           // of each segment; groups are numbered in the order of their first segments
   int groups = 0;
 
   // The frames of one group: neighbouring segments of the same clip are joined.
-  [[nodiscard]] std::vector<FrameRange> ranges(int group, const FrameTable& table) const;
+  [[nodiscard]] std::vector<FrameSpan> ranges(int group, const FrameTable& table) const;
 };
 
 // Groups the segments (in time, covering the table).
-[[nodiscard]] Grouping group_segments(const FrameTable& table, std::span<const FrameRange> segments,
+[[nodiscard]] Grouping group_segments(const FrameTable& table, std::span<const FrameSpan> segments,
                                       const GroupingOptions& options = {});
 
 }  // namespace kinespace

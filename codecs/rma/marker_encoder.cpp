@@ -137,7 +137,7 @@ int MarkerEncoder::axes_for(std::size_t group, double variance) const {
 double MarkerEncoder::mean_axes(double variance) const {
   double sum = 0;
   for (std::size_t g = 0; g < spaces_.size(); ++g) {
-    for (const FrameRange& range : analysis_.grouping.ranges(static_cast<int>(g), markers_)) {
+    for (const FrameSpan& range : analysis_.grouping.ranges(static_cast<int>(g), markers_)) {
       sum += static_cast<double>(range.frames()) * axes_for(g, variance);
     }
   }
@@ -148,7 +148,7 @@ double MarkerEncoder::variance_for(double left_cm) const {
   double total = 0;
   for (std::size_t g = 0; g < spaces_.size(); ++g) {
     double frames = 0;
-    for (const FrameRange& range : analysis_.grouping.ranges(static_cast<int>(g), markers_)) {
+    for (const FrameSpan& range : analysis_.grouping.ranges(static_cast<int>(g), markers_)) {
       frames += static_cast<double>(range.frames());
     }
     total += spaces_[g].total_variance * frames / static_cast<double>(markers_.frames);

@@ -42,7 +42,7 @@ std::vector<std::int64_t> path_references(const SelfDistance& distances, const R
 
 // Gives a clip the frames up to `last`, or from `first` on: a repeated one goes on in its primary clip at the same
 // pace, up to that clip's ends, which [least, most] are.
-void extend(RepeatClip& clip, std::int64_t first, std::int64_t last, FrameRange primary) {
+void extend(RepeatClip& clip, std::int64_t first, std::int64_t last, FrameSpan primary) {
   if (is_repeated(clip)) {
     std::vector<std::int64_t> reference;
     for (std::int64_t f = first; f < last; ++f) {
@@ -83,7 +83,7 @@ void ClipCollector::add(const GroupTable& in, std::span<const PrimaryChoice> cho
 std::vector<RepeatClip> ClipCollector::clips_of(const GroupTable& in, const PrimaryChoice& choice) const {
   std::vector<RepeatClip> out;
   out.push_back(clip_of_pixels(in.distances, in.group, choice.first, choice.last));
-  const FrameRange range{out[0].first, out[0].last};
+  const FrameSpan range{out[0].first, out[0].last};
   out[0].kind = RepeatClip::Kind::primary;
   const Eigen::MatrixXf primary = in.space.project(table_, std::span(&range, 1));
   // How far a path at the table's rate may be off; what a jump in the reference must save.
@@ -92,7 +92,7 @@ std::vector<RepeatClip> ClipCollector::clips_of(const GroupTable& in, const Prim
   for (const Repetition& repetition : choice.repetitions) {
     RepeatClip clip = clip_of_pixels(in.distances, in.group, repetition.first, repetition.last);
     clip.kind = RepeatClip::Kind::repeated;
-    const FrameRange own{clip.first, clip.last};
+    const FrameSpan own{clip.first, clip.last};
     clip.reference = warp_references(in.space.project(table_, std::span(&own, 1)), primary,
                                      path_references(in.distances, clip, out[0], choice.first, repetition), warp);
     for (std::int64_t& frame : clip.reference) frame += out[0].first;
@@ -101,15 +101,15 @@ std::vector<RepeatClip> ClipCollector::clips_of(const GroupTable& in, const Prim
   return out;
 }
 
-void ClipCollector::add_unique(int group, std::span<const FrameRange> ranges) {
-  for (const FrameRange& range : ranges) add_run(group, range, {});
+void ClipCollector::add_unique(int group, std::span<const FrameSpan> ranges) {
+  for (const FrameSpan& range : ranges) add_run(group, range, {});
 }
 
 // Fills what the clips of a range leave free.
-void ClipCollector::add_run(int group, FrameRange range, std::vector<RepeatClip> held) {
+void ClipCollector::add_run(int group, FrameSpan range, std::vector<RepeatClip> held) {
   std::sort(held.begin(), held.end(), [](const RepeatClip& a, const RepeatClip& b) { return a.first < b.first; });
   const auto referred = [this](const RepeatClip& clip) {
-    return is_repeated(clip) ? primaries_[static_cast<std::size_t>(clip.primary)] : FrameRange{};
+    return is_repeated(clip) ? primaries_[static_cast<std::size_t>(clip.primary)] : FrameSpan{};
   };
   std::int64_t at = range.first;
   for (std::size_t c = 0; c <= held.size(); ++c) {

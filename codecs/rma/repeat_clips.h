@@ -21,20 +21,20 @@ class ClipCollector {
   ClipCollector(const FrameTable& table, double shortest_s);
 
   void add(const GroupTable& in, std::span<const PrimaryChoice> choices);
-  void add_unique(int group, std::span<const FrameRange> ranges);
+  void add_unique(int group, std::span<const FrameSpan> ranges);
 
   // All clips, in time.
   [[nodiscard]] std::vector<RepeatClip> finish() &&;
 
  private:
-  void add_run(int group, FrameRange range, std::vector<RepeatClip> held);
+  void add_run(int group, FrameSpan range, std::vector<RepeatClip> held);
 
   [[nodiscard]] std::vector<RepeatClip> clips_of(const GroupTable& in, const PrimaryChoice& choice) const;
 
   const FrameTable& table_;
   std::int64_t shortest_;
-  std::vector<RepeatClip> clips_;      // until finish(), `primary` of primary and repeated clips is an index of
-  std::vector<FrameRange> primaries_;  // these: primary clips as they were chosen
+  std::vector<RepeatClip> clips_;     // until finish(), `primary` of primary and repeated clips is an index of
+  std::vector<FrameSpan> primaries_;  // these: primary clips as they were chosen
 };
 
 }  // namespace kinespace

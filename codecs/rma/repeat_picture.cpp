@@ -36,7 +36,7 @@ int largest_group(const FrameTable& table, const RepeatAnalysis& analysis) {
   std::int64_t most = -1;
   for (int group = 0; group < analysis.grouping.groups; ++group) {
     std::int64_t frames = 0;
-    for (const FrameRange& range : analysis.grouping.ranges(group, table)) frames += range.frames();
+    for (const FrameSpan& range : analysis.grouping.ranges(group, table)) frames += range.frames();
     if (frames > most) best = group;
     most = std::max(most, frames);
   }
@@ -68,7 +68,7 @@ class RepeatPicture {
   // The pixel of a frame, between pixels too; negative when the table has not got it.
   [[nodiscard]] double pixel_of(std::int64_t frame) const {
     for (int run = 0; run < distances_.run_count(); ++run) {
-      const FrameRange range = distances_.run_frames(run);
+      const FrameSpan range = distances_.run_frames(run);
       if (frame < range.first || frame >= range.last) continue;
       return distances_.run_first_pixel(run) + static_cast<double>(frame - range.first) / distances_.stride();
     }

@@ -100,7 +100,7 @@ RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& opt
   out.grouping = group_segments(table, behaviour_segments(table, options.segmentation), options.grouping);
   out.spaces.resize(static_cast<std::size_t>(out.grouping.groups));
   tbb::parallel_for(std::size_t{0}, out.spaces.size(), [&](std::size_t group) {
-    const std::vector<FrameRange> ranges = out.grouping.ranges(static_cast<int>(group), table);
+    const std::vector<FrameSpan> ranges = out.grouping.ranges(static_cast<int>(group), table);
     out.spaces[group] = fit_group_space(table, ranges, {.variance = options.variance});
   });
 

@@ -19,7 +19,7 @@ namespace {
 // stretch of whole steps cost a subtraction.
 class StepSums {
  public:
-  StepSums(const FrameTable& table, FrameRange clip, std::int64_t step, bool backward)
+  StepSums(const FrameTable& table, FrameSpan clip, std::int64_t step, bool backward)
       : steps_(clip.frames() / step), sum_(steps_ + 1), products_(steps_ + 1), step_(step) {
     const int d = table.dimensions;
     sum_[0] = Eigen::VectorXd::Zero(d);
@@ -108,7 +108,7 @@ std::vector<std::size_t> direction_cuts(const StepSums& sums, std::size_t window
   return cuts;
 }
 
-void add_clip_cuts(const FrameTable& table, FrameRange clip, const Pace& pace, double least_variance,
+void add_clip_cuts(const FrameTable& table, FrameSpan clip, const Pace& pace, double least_variance,
                    const SegmentationOptions& options, std::vector<std::int64_t>& cuts) {
   const auto step = pace.step;
   if (clip.frames() < 2 * static_cast<std::int64_t>(pace.window) * step) return;
@@ -123,10 +123,10 @@ void add_clip_cuts(const FrameTable& table, FrameRange clip, const Pace& pace, d
 
 // The segments between the cuts of a clip: cuts nearer than `apart` are one, at their mean, and none is that near to an
 // end of the clip.
-std::vector<FrameRange> segments_between(FrameRange clip, std::vector<std::int64_t> cuts, std::int64_t apart) {
+std::vector<FrameSpan> segments_between(FrameSpan clip, std::vector<std::int64_t> cuts, std::int64_t apart) {
   apart = std::max<std::int64_t>(apart, 1);
   std::sort(cuts.begin(), cuts.end());
-  std::vector<FrameRange> out;
+  std::vector<FrameSpan> out;
   std::int64_t first = clip.first;
   for (std::size_t c = 0; c < cuts.size();) {
     std::int64_t sum = 0, count = 0;
@@ -151,11 +151,11 @@ void SegmentationOptions::validate() const {
   require_option("dimensions", dimensions, 2, 64);
 }
 
-std::vector<FrameRange> behaviour_segments(const FrameTable& table, const SegmentationOptions& options) {
+std::vector<FrameSpan> behaviour_segments(const FrameTable& table, const SegmentationOptions& options) {
   options.validate();
   table.validate();
   const FrameTable reduced = reduced_table(table, options.dimensions);
-  const FrameRange all{0, reduced.frames};
+  const FrameSpan all{0, reduced.frames};
   const double total = frame_moments(reduced, std::span(&all, 1)).covariance.trace();
   const double least_variance = std::max(1e-4 * total / reduced.dimensions, 1e-12);
   Pace pace;
@@ -164,14 +164,14 @@ std::vector<FrameRange> behaviour_segments(const FrameTable& table, const Segmen
       std::max<std::int64_t>(1, std::llround(options.window_s * table.rate_hz / static_cast<double>(pace.step))));
   const auto apart = static_cast<std::int64_t>(std::llround(options.apart_s * table.rate_hz));
 
-  std::vector<std::vector<FrameRange>> parts(table.starts.size());
+  std::vector<std::vector<FrameSpan>> parts(table.starts.size());
   tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t c) {
-    const FrameRange clip{table.starts[c], c + 1 < table.starts.size() ? table.starts[c + 1] : table.frames};
+    const FrameSpan clip{table.starts[c], c + 1 < table.starts.size() ? table.starts[c + 1] : table.frames};
     std::vector<std::int64_t> cuts;
     add_clip_cuts(reduced, clip, pace, least_variance, options, cuts);
     parts[c] = segments_between(clip, std::move(cuts), apart);
   });
-  std::vector<FrameRange> out;
+  std::vector<FrameSpan> out;
   for (const auto& part : parts) out.insert(out.end(), part.begin(), part.end());
   return out;
 }

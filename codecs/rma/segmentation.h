@@ -31,7 +31,7 @@ struct SegmentationOptions {
 };
 
 // The segments, in time: they cover all frames, and every start of the table begins one.
-[[nodiscard]] std::vector<FrameRange> behaviour_segments(const FrameTable& table,
-                                                         const SegmentationOptions& options = {});
+[[nodiscard]] std::vector<FrameSpan> behaviour_segments(const FrameTable& table,
+                                                        const SegmentationOptions& options = {});
 
 }  // namespace kinespace

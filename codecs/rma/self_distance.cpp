@@ -12,7 +12,7 @@ constexpr float gap_square = 1e30F;
 
 }  // namespace
 
-SelfDistance::SelfDistance(const GroupSpace& space, const FrameTable& table, std::span<const FrameRange> ranges,
+SelfDistance::SelfDistance(const GroupSpace& space, const FrameTable& table, std::span<const FrameSpan> ranges,
                            int stride)
     : ranges_(ranges.begin(), ranges.end()), stride_(stride), rate_hz_(table.rate_hz) {
   assert(stride >= 1);
@@ -39,7 +39,7 @@ SelfDistance::SelfDistance(const GroupSpace& space, const FrameTable& table, std
 }
 
 std::int64_t SelfDistance::frame(int pixel, int run) const {
-  const FrameRange range = ranges_[static_cast<std::size_t>(run)];
+  const FrameSpan range = ranges_[static_cast<std::size_t>(run)];
   const std::int64_t offset = static_cast<std::int64_t>(pixel - first_pixel_[static_cast<std::size_t>(run)]) * stride_;
   return std::min(range.first + offset, range.last);
 }

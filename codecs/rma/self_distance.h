@@ -24,7 +24,7 @@ class SelfDistance {
   using Tile = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
   // `stride` >= 1. The ranges are those of one group, in time.
-  SelfDistance(const GroupSpace& space, const FrameTable& table, std::span<const FrameRange> ranges, int stride);
+  SelfDistance(const GroupSpace& space, const FrameTable& table, std::span<const FrameSpan> ranges, int stride);
 
   [[nodiscard]] int size() const { return static_cast<int>(coefficients_.cols()); }
   [[nodiscard]] int stride() const { return stride_; }
@@ -34,7 +34,7 @@ class SelfDistance {
   // Which of the ranges the pixel lies in; -1 for a gap.
   [[nodiscard]] int run(int pixel) const { return run_[static_cast<std::size_t>(pixel)]; }
   [[nodiscard]] int run_count() const { return static_cast<int>(ranges_.size()); }
-  [[nodiscard]] FrameRange run_frames(int run) const { return ranges_[static_cast<std::size_t>(run)]; }
+  [[nodiscard]] FrameSpan run_frames(int run) const { return ranges_[static_cast<std::size_t>(run)]; }
   [[nodiscard]] int run_first_pixel(int run) const { return first_pixel_[static_cast<std::size_t>(run)]; }
   // The frame a pixel stands for; of the pixel after a run's last, the frame after the run's last.
   [[nodiscard]] std::int64_t frame(int pixel, int run) const;
@@ -52,7 +52,7 @@ class SelfDistance {
   Eigen::MatrixXf coefficients_;  // [axis][pixel]
   Eigen::VectorXf squares_;       // [pixel]; of a gap, far more than of any frame
   std::vector<int> run_;          // of each pixel
-  std::vector<FrameRange> ranges_;
+  std::vector<FrameSpan> ranges_;
   std::vector<int> first_pixel_;  // of each run
   int stride_ = 1;
   double rate_hz_ = 0;

@@ -6,9 +6,9 @@
 
 namespace kinespace {
 
-std::vector<TablePart> table_parts(std::span<const FrameRange> ranges, double rate_hz, const RepeatOptions& options) {
+std::vector<TablePart> table_parts(std::span<const FrameSpan> ranges, double rate_hz, const RepeatOptions& options) {
   std::int64_t frames = 0;
-  for (const FrameRange& range : ranges) frames += range.frames();
+  for (const FrameSpan& range : ranges) frames += range.frames();
   const auto most = static_cast<std::int64_t>(options.table_frames);
   int stride = std::max(1, static_cast<int>(std::lround(rate_hz / options.table_rate_hz)));
   if (frames > most * stride) stride *= 2;
@@ -17,7 +17,7 @@ std::vector<TablePart> table_parts(std::span<const FrameRange> ranges, double ra
 
   std::vector<TablePart> out;
   std::int64_t room = 0;
-  for (FrameRange range : ranges) {
+  for (FrameSpan range : ranges) {
     while (range.frames() > 0) {
       if (room == 0) {
         out.push_back({{}, stride});

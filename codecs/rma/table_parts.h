@@ -11,13 +11,13 @@ namespace kinespace {
 
 // One table: ranges of one group, in time, and the frames that a pixel stands for.
 struct TablePart {
-  std::vector<FrameRange> ranges;
+  std::vector<FrameSpan> ranges;
   int stride = 1;
 };
 
 // A group too large for one table at `table_rate_hz` gets one at half that rate; one that is too large still, several
 // tables of about equal size, between which no repetition is seen.
-[[nodiscard]] std::vector<TablePart> table_parts(std::span<const FrameRange> ranges, double rate_hz,
+[[nodiscard]] std::vector<TablePart> table_parts(std::span<const FrameSpan> ranges, double rate_hz,
                                                  const RepeatOptions& options);
 
 }  // namespace kinespace

@@ -28,25 +28,25 @@ FrameTable two_behaviours() {
   return out;
 }
 
-void expect_cover(const std::vector<FrameRange>& segments, const FrameTable& table) {
+void expect_cover(const std::vector<FrameSpan>& segments, const FrameTable& table) {
   std::int64_t at = 0;
-  for (const FrameRange& segment : segments) {
+  for (const FrameSpan& segment : segments) {
     EXPECT_EQ(segment.first, at);
     EXPECT_GT(segment.last, segment.first);
     at = segment.last;
   }
   EXPECT_EQ(at, table.frames);
   for (const std::int64_t start : table.starts) {
-    EXPECT_THAT(segments, testing::Contains(testing::Field(&FrameRange::first, start)));
+    EXPECT_THAT(segments, testing::Contains(testing::Field(&FrameSpan::first, start)));
   }
 }
 
 TEST(rma_segmentation, a_change_of_behaviour_is_cut_where_it_is) {
   const FrameTable table = two_behaviours();
-  const std::vector<FrameRange> segments = behaviour_segments(table);
+  const std::vector<FrameSpan> segments = behaviour_segments(table);
   expect_cover(segments, table);
   EXPECT_THAT(segments, testing::Contains(testing::Field(
-                            &FrameRange::first, testing::AllOf(testing::Gt(480 - 20), testing::Lt(480 + 20)))));
+                            &FrameSpan::first, testing::AllOf(testing::Gt(480 - 20), testing::Lt(480 + 20)))));
   EXPECT_LE(segments.size(), 4U);
 }
 
@@ -85,7 +85,7 @@ TEST(rma_segmentation, a_held_pose_is_one_segment) {
 TEST(rma_grouping, segments_of_one_behaviour_meet_in_one_group) {
   FrameTable table = empty_table(12, rate);
   const Cycle a(12, 0), b(12, 1);
-  std::vector<FrameRange> segments;
+  std::vector<FrameSpan> segments;
   const std::vector<int> behaviour{0, 1, 1, 0, 1, 0, 0, 1};
   for (const int which : behaviour) {
     add_clip(table, 600, [&](double t) { return which == 0 ? a(t / 61) : b(t / 47); });
@@ -100,7 +100,7 @@ TEST(rma_grouping, segments_of_one_behaviour_meet_in_one_group) {
 TEST(rma_grouping, two_groups_that_need_the_same_axes_are_one) {
   FrameTable table = empty_table(12, rate);
   const Cycle walk(12, 0);
-  std::vector<FrameRange> segments;
+  std::vector<FrameSpan> segments;
   for (int s = 0; s < 6; ++s) {
     add_clip(table, 300 + s, [&](double t) { return walk((t + 10 * s) / (55 + s)); });
     segments.push_back({table.starts.back(), table.frames});
@@ -112,13 +112,13 @@ TEST(rma_grouping, ranges_join_neighbours_of_a_clip_and_stop_at_starts) {
   FrameTable table = empty_table(2, rate);
   for (int c = 0; c < 2; ++c) add_clip(table, 100, [](double t) { return Eigen::VectorXd::Constant(2, t); });
   const Grouping grouping{.segments = {{0, 40}, {40, 100}, {100, 130}, {130, 200}}, .group = {0, 0, 0, 1}, .groups = 2};
-  EXPECT_THAT(grouping.ranges(0, table), testing::ElementsAre(FrameRange{0, 100}, FrameRange{100, 130}));
+  EXPECT_THAT(grouping.ranges(0, table), testing::ElementsAre(FrameSpan{0, 100}, FrameSpan{100, 130}));
 }
 
 class rma_group_space : public testing::Test {
  protected:
   FrameTable table_ = two_behaviours();
-  FrameRange range_{100, 700};
+  FrameSpan range_{100, 700};
 
   // The mean squared distance of the frames to the space.
   double residual(const GroupSpace& space) const {
@@ -161,7 +161,7 @@ TEST_F(rma_group_space, the_fewest_axes_that_leave_no_more_than_asked) {
 TEST_F(rma_group_space, a_held_pose_has_one_axis_and_no_variance) {
   FrameTable held = empty_table(5, rate);
   add_clip(held, 50, [](double /*t*/) { return Eigen::VectorXd::Constant(5, -3); });
-  const FrameRange all{0, 50};
+  const FrameSpan all{0, 50};
   const GroupSpace space = fit_group_space(held, std::span(&all, 1));
   EXPECT_EQ(space.axis_count(), 1);
   EXPECT_NEAR(space.total_variance, 0, 1e-9);

@@ -19,7 +19,7 @@ constexpr double rate = 30;
 
 struct Group {
   FrameTable table;
-  std::vector<FrameRange> ranges;
+  std::vector<FrameSpan> ranges;
   GroupSpace space;
 
   explicit Group(FrameTable frames) : table(std::move(frames)) {

@@ -34,7 +34,7 @@ void expect_sound(const RepeatAnalysis& analysis, const FrameTable& table) {
     at = clip.last;
     for (const std::int64_t start : table.starts) EXPECT_FALSE(start > clip.first && start < clip.last);
     for (std::size_t s = 0; s < analysis.grouping.segments.size(); ++s) {
-      const FrameRange& segment = analysis.grouping.segments[s];
+      const FrameSpan& segment = analysis.grouping.segments[s];
       if (segment.first >= clip.last || clip.first >= segment.last) continue;
       EXPECT_EQ(analysis.grouping.group[s], clip.group);
     }
@@ -71,7 +71,7 @@ double reference_distance(const RepeatAnalysis& analysis, const FrameTable& tabl
 // Numbers on a line, one a frame: distances are differences.
 struct Line {
   FrameTable table = empty_table(1, 30);
-  std::vector<FrameRange> ranges;
+  std::vector<FrameSpan> ranges;
   void add(const std::vector<double>& values) {
     add_clip(table, static_cast<int>(values.size()),
              [&](double t) { return Eigen::VectorXd::Constant(1, values[static_cast<std::size_t>(t)]); });
