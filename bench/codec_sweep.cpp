@@ -26,7 +26,7 @@ struct Quality {
 const std::vector<Quality>& qualities() {
   static const std::vector<Quality> all{
       {"motion-space", "step", {0.35, 0.7, 1.4, 2.8, 5.6, 11, 16, 22}},
-      {"qbc", "max-squared-distance", {2, 4, 7, 12, 18, 28, 50, 100, 200, 400}},
+      {"qbc", "max_squared_distance", {2, 4, 7, 12, 18, 28, 50, 100, 200, 400}},
       {"pca", "components", {40, 32, 26, 22, 18, 15, 13, 11, 9, 7, 5}},
       {"dwt", "threshold", {0.5, 0.7, 1, 1.4, 2, 3, 4, 5.5, 7, 10, 15, 20, 30}},
       {"awt", "coefficients", {2500, 1280, 640, 320, 200, 120, 80, 60, 45, 35, 25, 18, 12}},

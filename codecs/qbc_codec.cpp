@@ -21,12 +21,12 @@ namespace kinespace {
 namespace {
 
 constexpr std::array qbc_settings{
-    CodecSetting{"max-squared-distance", 18, 1e-8, 1e6,
+    CodecSetting{"max_squared_distance", 18, 1e-8, 1e6,
                  "limit d^2 of a joint's squared distance in every frame, in squared degrees (root units)"},
     CodecSetting{"interval", 160, 1, longest_segment, "frames between the breaks that all joints have"},
-    CodecSetting{"root-unit", 5.6444F, 1e-3, 1e3, "cm of the root's position that count as a degree"},
+    CodecSetting{"root_unit", 5.6444F, 1e-3, 1e3, "cm of the root's position that count as a degree"},
     CodecSetting{"merge", 1, 0, 1, "1: breaks chosen by error and bits; 0: the paper's rule alone"},
-    CodecSetting{"rate-weight", 0.05, 0, 1, "share of the limit that a bit is worth when breaks and points are chosen"},
+    CodecSetting{"rate_weight", 0.05, 0, 1, "share of the limit that a bit is worth when breaks and points are chosen"},
 };
 
 struct Plan {
@@ -243,15 +243,15 @@ std::span<const CodecSetting> QbcCodec::settings() const {
 }
 
 Bytes QbcCodec::encode(std::span<const Clip> clips, const CodecOptions& options) const {
-  const Plan plan{.limit = setting(options, "max-squared-distance"),
+  const Plan plan{.limit = setting(options, "max_squared_distance"),
                   .interval = static_cast<int>(setting(options, "interval")),
-                  .root_unit = setting(options, "root-unit"),
+                  .root_unit = setting(options, "root_unit"),
                   .paper = setting(options, "merge") < 0.5,
-                  .rate_weight = setting(options, "rate-weight")};
+                  .rate_weight = setting(options, "rate_weight")};
   if (options.target.any()) return LimitSearch(clips, plan, options).find();
   const double tolerance = std::clamp(0.02 * std::sqrt(plan.limit), 1e-5, 0.01);
   QbcEncoder::Result result = QbcEncoder(clips, tolerance).encode(plan, options.progress);
-  if (!result.kept) cannot_meet(fmt::format("max-squared-distance = {}", plan.limit), "a larger one");
+  if (!result.kept) cannot_meet(fmt::format("max_squared_distance = {}", plan.limit), "a larger one");
   return std::move(result.stream);
 }
 

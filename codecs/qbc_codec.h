@@ -1,7 +1,7 @@
 // The `qbc` codec: quadratic Bezier break-and-fit (M. A. Khan, Multimed Tools Appl 2014), each joint by itself.
 //
 // A joint's channels (codecs/joint_channels.h: the turns that it makes, in degrees; the travel root's position in units
-// of `root-unit` beside its turns) are a curve in R^N of connected quadratic Bezier segments. No frame of a joint is
+// of `root_unit` beside its turns) are a curve in R^N of connected quadratic Bezier segments. No frame of a joint is
 // farther from it than the limit d^2, a hard maximum of the squared distance of the *decoded* curve in the channels'
 // own units; joints that never turn are exact to 0.01 degrees.
 //

@@ -53,7 +53,7 @@ TEST(Qbc, no_frame_of_any_joint_passes_the_limit) {
     for (const double limit : {0.3, 4.0, 60.0}) {
       for (const double merge : {0.0, 1.0}) {
         const Bytes stream =
-            encode("qbc", std::span(&clip, 1), {.settings = {{"max-squared-distance", limit}, {"merge", merge}}});
+            encode("qbc", std::span(&clip, 1), {.settings = {{"max_squared_distance", limit}, {"merge", merge}}});
         const Clip decoded = open(stream)->decode(0, -1);
         EXPECT_LE(largest_squared_distance(clip, decoded, layout), limit * (1 + 1e-6)) << clip.name << " " << merge;
       }
@@ -158,7 +158,7 @@ double file_error(const Clip& clip, const Clip& decoded, int frame) {
 TEST(Qbc, the_roots_file_angles_stay_near_at_their_poles) {
   const Clip clip = walk_through_a_pole();
   for (const double limit : {0.5, 4.0, 18.0, 100.0}) {
-    const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max-squared-distance", limit}}});
+    const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max_squared_distance", limit}}});
     const auto reader = open(stream);
     const Clip decoded = reader->decode(0, -1);
     const ChannelLayout layout = find_channel_layout(std::span(&clip, 1));
@@ -171,7 +171,7 @@ TEST(Qbc, the_roots_file_angles_stay_near_at_their_poles) {
 
 TEST(Qbc, previews_and_parts_have_the_corrections_of_the_whole) {
   const Clip clip = walk_through_a_pole();
-  const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max-squared-distance", 8}, {"interval", 1}}});
+  const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max_squared_distance", 8}, {"interval", 1}}});
   const auto reader = open(stream);
   const Clip whole = reader->decode(0, -1);
   const Clip preview = reader->decode_preview(0);
@@ -184,7 +184,7 @@ TEST(Qbc, previews_and_parts_have_the_corrections_of_the_whole) {
 
 TEST(Qbc, damaged_curves_with_corrections_are_errors_or_clips) {
   const Clip clip = slice(walk_through_a_pole(), 40, 70);
-  const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max-squared-distance", 4}}});
+  const Bytes stream = encode("qbc", std::span(&clip, 1), {.settings = {{"max_squared_distance", 4}}});
   const Bytes whole = test::part(stream, "curves");
   int errors = 0;
   for (std::size_t n = 0; n < whole.size(); ++n) {
