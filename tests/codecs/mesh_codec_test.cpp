@@ -35,8 +35,8 @@ class MeshCodec : public testing::TestWithParam<std::string_view> {
   }
 };
 INSTANTIATE_TEST_SUITE_P(All, MeshCodec, testing::ValuesIn(mesh_codecs().begin(), mesh_codecs().end()),
-                         [](const auto& info) {
-                           std::string name(info.param);
+                         [](const auto& kind) {
+                           std::string name(kind.param);
                            name[name.find('-')] = '_';
                            return name;
                          });

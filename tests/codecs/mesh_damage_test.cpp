@@ -64,7 +64,7 @@ class MeshDamage : public testing::TestWithParam<Kind> {
     return out;
   }
 };
-INSTANTIATE_TEST_SUITE_P(All, MeshDamage, testing::ValuesIn(kinds()), [](const auto& info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(All, MeshDamage, testing::ValuesIn(kinds()), [](const auto& kind) { return kind.param.name; });
 
 TEST_P(MeshDamage, every_prefix_is_an_error) {
   ASSERT_TRUE(decodes(stream()));
