@@ -1,5 +1,6 @@
 #include "mesh/mesh_error.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -80,8 +81,17 @@ TEST(MeshError, other_shapes_are_refused) {
   EXPECT_THROW((void)compare(mesh, sheet(4, 4, 2)), Error);
   EXPECT_THROW((void)compare(mesh, sheet(4, 5, 3)), Error);
   MeshSequence turned = mesh;
-  std::swap(turned.triangles[0], turned.triangles[1]);
+  std::swap(turned.triangles[0][0], turned.triangles[0][1]);
   EXPECT_THROW((void)compare(mesh, turned), Error);
+}
+
+TEST(MeshError, the_order_of_triangles_and_where_they_begin_do_not_matter) {
+  const MeshSequence mesh = sheet(4, 4, 3);
+  MeshSequence other = mesh;
+  std::swap(other.triangles[0], other.triangles[1]);
+  std::ranges::rotate(other.triangles[2], other.triangles[2].begin() + 1);
+  EXPECT_EQ(compare(mesh, other).kg, 0);
+  EXPECT_EQ(compare(mesh, other).lr, 0);
 }
 
 }  // namespace
