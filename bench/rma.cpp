@@ -70,8 +70,10 @@ class RmaBench {
     add(name + "mean joint error", set, coded.mean_error_cm, "cm", error_cm, false);
     if (!judged) return coded.ratio;
     const DecodedFigures seen = judge_set(set, coded);
+    // The bar is for recordings at 120 Hz; at 30 Hz the figure is reported.
+    const auto slide_bar = set.streams.front().front().rate_hz > 60 ? std::optional(0.5) : std::nullopt;
     add(name + "slide of planted feet over the original's", set, seen.slide_cm_s - seen.original_slide_cm_s, "cm/s",
-        0.5, false);
+        slide_bar, false);
     add(name + "largest speed change where clips meet", set, seen.seam_ratio, "x p99.9 elsewhere", 1.0, false);
     return coded.ratio;
   }
