@@ -1,0 +1,84 @@
+// The mesh command as a user runs it, on a tube that bends.
+#include <filesystem>
+#include <memory>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "mesh/mesh_files.h"
+#include "tests/cli/run_command.h"
+#include "tests/mesh/sample_meshes.h"
+#include "tests/support/data.h"
+
+namespace kinespace::test {
+namespace {
+
+using nlohmann::json;
+
+class MeshCommand : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = std::make_unique<TemporaryFolder>();
+    write_mesh_sequence(at("tube"), bending_tube(600, 12, 1.0));
+  }
+  static void TearDownTestSuite() { folder_.reset(); }
+  static std::string at(const char* name) { return (*folder_ / name).string(); }
+  static json run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), "mesh");
+    arguments.emplace_back("--json");
+    const CommandResult result = run_command(arguments);
+    EXPECT_EQ(result.code, 0) << result.err;
+    return result.code == 0 ? json::parse(result.out) : json::object();
+  }
+  static std::string fails(std::vector<std::string> arguments, int code) {
+    arguments.insert(arguments.begin(), "mesh");
+    const CommandResult result = run_command(arguments);
+    EXPECT_EQ(result.code, code) << result.err;
+    return result.err;
+  }
+
+  static std::unique_ptr<TemporaryFolder> folder_;
+};
+std::unique_ptr<TemporaryFolder> MeshCommand::folder_;
+
+TEST_F(MeshCommand, a_sequence_goes_there_and_back_within_the_error_asked_for) {
+  const json encoded = run({"encode", at("tube"), "-o", at("tube.ksm"), "--kg", "1"});
+  for (const char* key : {"codec", "vertices", "triangles", "frames", "bytes", "bpvf", "bpvf_without_connectivity",
+                          "kg", "kg_time", "lr"}) {
+    EXPECT_TRUE(encoded.contains(key)) << key;
+  }
+  EXPECT_LE(encoded["kg"], 1);
+  EXPECT_EQ(encoded["bytes"], std::filesystem::file_size(at("tube.ksm")));
+  EXPECT_EQ(run({"decode", at("tube.ksm"), "-o", at("back")})["frames"], 12);
+  const json compared = run({"compare", at("tube"), at("back"), "--picture", at("tube.png")});
+  EXPECT_NEAR(compared["kg"], encoded["kg"], 1e-3);
+  EXPECT_TRUE(std::filesystem::exists(at("tube.png")));
+  EXPECT_EQ(run({"decode", at("tube.ksm"), "-o", at("part"), "--from", "3", "--to", "5"})["frames"], 3);
+}
+
+TEST_F(MeshCommand, info_describes_sequences_and_streams) {
+  const json sequence = run({"info", at("tube")});
+  EXPECT_EQ(sequence["kind"], "mesh");
+  EXPECT_EQ(sequence["components"], 1);
+  EXPECT_EQ(sequence["watertight"], true);
+  run({"encode", at("tube"), "-o", at("draco.ksm"), "--codec", "mesh-draco", "--kg", "1"});
+  const json stream = run({"info", at("draco.ksm")});
+  EXPECT_EQ(stream["codec"], "mesh-draco");
+  EXPECT_EQ(stream["vertices"], sequence["vertices"]);
+}
+
+TEST_F(MeshCommand, wrong_input_is_told_by_name) {
+  EXPECT_NE(fails({"info", at("nowhere")}, 1).find("nowhere"), std::string::npos);
+  fails({"encode", at("tube"), "-o", at("x.ksm"), "--codec", "zip"}, 2);
+  fails({"encode", at("tube"), "-o", at("x.ksm"), "--kg", "1", "--bytes", "500"}, 2);
+  run({"encode", at("tube"), "-o", at("good.ksm"), "--kg", "1"});
+  const std::string text = read_text(at("good.ksm"));
+  write_text(at("bad.ksm"), text.substr(0, text.size() / 2));
+  EXPECT_NE(fails({"decode", at("bad.ksm"), "-o", at("y")}, 1).find("bad.ksm"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(at("y")));
+  write_mesh_sequence(at("other"), bending_tube(400, 12, 1.0));
+  fails({"compare", at("tube"), at("other")}, 1);
+}
+
+}  // namespace
+}  // namespace kinespace::test
