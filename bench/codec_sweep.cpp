@@ -79,10 +79,6 @@ SweepClip read_sweep_clip(const std::filesystem::path& path) {
   return out;
 }
 
-double raw_bytes(const Clip& clip) {
-  return 4.0 * clip.frames * (3.0 + 3.0 * static_cast<double>(clip.skeleton.rotating_joints().size()));
-}
-
 double channel_mse(const SweepClip& original, const Clip& decoded) {
   const Clip& clip = original.clip;
   const double cm_per_unit = original.asf ? original.asf->cm_per_unit : 1;

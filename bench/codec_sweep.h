@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "codecs/clip_error.h"
 #include "codecs/codec.h"
 #include "motion/amc.h"
 
@@ -48,9 +49,6 @@ struct CodecPoint {
 // angles of C^-1 R C about the axes of the ASF, in degrees, and the root in units of the file; of other clips those of
 // the skeleton. Angles that a decoded clip has where the file has no channel count as error too.
 [[nodiscard]] double channel_mse(const SweepClip& original, const Clip& decoded);
-
-// 32-bit floats of three numbers for the root and three for each rotating joint.
-[[nodiscard]] double raw_bytes(const Clip& clip);
 
 // The text ratio of a sweep at a mean squared error, by linear interpolation of the logarithms; nothing outside.
 [[nodiscard]] std::optional<double> ratio_at(std::span<const CodecPoint> points, double mse);

@@ -2,7 +2,6 @@
 // every codec over its range of qualities; the tables and figures of khan2014 and yoo2019.
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -11,13 +10,14 @@
 
 #include "bench/codec_papers.h"
 #include "bench/report.h"
+#include "bench/timing.h"
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "base/error.h"
 #include "codecs/joint_channels.h"
 #include "codecs/quadratic_bezier.h"
 #include "codecs/registry.h"
+#include "fpca/library_builder.h"
 #include "motion/read.h"
 
 namespace kinespace {
@@ -40,20 +40,8 @@ struct CodecData {
 };
 
 std::vector<Clip> read_folder(const fs::path& folder) {
-  std::vector<fs::path> files;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    if (is_motion_file(entry.path())) files.push_back(entry.path());
-  }
-  if (files.empty()) {
-    throw Error(ErrorKind::bad_input, {.file = folder.string(),
-                                       .found = "no motion files",
-                                       .expected = "the clips of bandai2 and cmu",
-                                       .remedy = "name the folder that has them by --data"});
-  }
-  std::ranges::sort(files);
   std::vector<Clip> out;
-  for (const fs::path& file : files) out.push_back(read_clip(file));
+  for (const fs::path& file : find_motion_files({folder})) out.push_back(read_clip(file));
   return out;
 }
 
@@ -61,13 +49,6 @@ struct Bar {
   double error_cm;
   double bytes_per_frame;
 };
-
-template <typename Work>
-double seconds(const Work& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 // Decoding on one core, the fastest of a few rounds: other processes only slow it down.
 double decoding_seconds(const std::vector<Bytes>& streams) {

@@ -1,7 +1,6 @@
 // `kinespace bench mesh`: what the mesh codecs make of the shared sequences; tables 2 to 4 and figure 11 of chen2019,
 // remade on those of its sequences that are there.
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "bench/plot.h"
 #include "bench/report.h"
+#include "bench/timing.h"
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
@@ -20,13 +20,6 @@
 
 namespace kinespace {
 namespace {
-
-template <typename Work>
-double seconds(const Work& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 struct Point {
   double bpvf = 0, without_connectivity = 0, kg = 0, lr = 0;

@@ -10,10 +10,10 @@
 #include "bench/rma_measures.h"
 #include <fmt/format.h>
 
-#include "base/error.h"
 #include "codecs/registry.h"
 #include "codecs/rma/markers.h"
 #include "codecs/rma/repeats.h"
+#include "fpca/library_builder.h"
 #include "motion/read.h"
 
 namespace kinespace {
@@ -24,22 +24,8 @@ namespace fs = std::filesystem;
 using Settings = std::map<std::string, double, std::less<>>;
 
 std::vector<Clip> read_folders(const std::vector<fs::path>& folders) {
-  std::vector<fs::path> files;
-  for (const fs::path& folder : folders) {
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-      if (is_motion_file(entry.path())) files.push_back(entry.path());
-    }
-  }
-  if (files.empty()) {
-    throw Error(ErrorKind::bad_input, {.file = folders.front().string(),
-                                       .found = "no motion files",
-                                       .expected = "the clips of cmu, bandai1 and bandai2",
-                                       .remedy = "name the folder that has them by --data"});
-  }
-  std::ranges::sort(files);
   std::vector<Clip> out;
-  for (const fs::path& file : files) out.push_back(read_clip(file));
+  for (const fs::path& file : find_motion_files(folders)) out.push_back(read_clip(file));
   return out;
 }
 

@@ -1,12 +1,13 @@
 #include "bench/rma_measures.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
+#include "bench/timing.h"
 #include <tbb/parallel_for.h>
 
+#include "codecs/clip_error.h"
 #include "codecs/registry.h"
 #include "codecs/rma/rma_codec.h"
 #include "footskate/skate_measures.h"
@@ -14,13 +15,6 @@
 
 namespace kinespace {
 namespace {
-
-template <typename Work>
-double seconds(const Work& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
 
 struct ClipJudgement {
   double slide = 0;
@@ -64,7 +58,7 @@ double CodedSet::raw_bytes() const {
   double out = 0;
   for (const auto& clips : streams) {
     for (const Clip& clip : clips) {
-      out += 4.0 * clip.frames * (3.0 + 3.0 * static_cast<double>(clip.skeleton.rotating_joints().size()));
+      out += kinespace::raw_bytes(clip);
     }
   }
   return out;

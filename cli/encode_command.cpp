@@ -14,6 +14,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "codecs/clip_error.h"
 #include "codecs/library_basis.h"
 #include "codecs/registry.h"
 #include "motion/read.h"
@@ -88,15 +89,6 @@ std::map<std::string, double, std::less<>> parse_settings(const std::vector<std:
   return out;
 }
 
-// 32-bit floats of three numbers for the root and three for each rotating joint, in all frames.
-double raw_bytes(const std::vector<Clip>& clips) {
-  double out = 0;
-  for (const Clip& clip : clips) {
-    out += 4.0 * clip.frames * (3.0 + 3.0 * static_cast<double>(clip.skeleton.rotating_joints().size()));
-  }
-  return out;
-}
-
 // The settings with --profile and --variance among them.
 std::map<std::string, double, std::less<>> all_settings(const EncodeOptions& options) {
   auto out = parse_settings(options.settings);
@@ -124,7 +116,11 @@ void run_encode(const EncodeOptions& options, Session& session) {
   write_file_atomically(options.output, stream);
 
   double frames = 0;
-  for (const Clip& clip : clips) frames += clip.frames;
+  double raw = 0;
+  for (const Clip& clip : clips) {
+    frames += clip.frames;
+    raw += raw_bytes(clip);
+  }
   const MeasuredError error = Bitstream::parse(stream, options.output.string()).error();
   const auto bytes = static_cast<double>(stream.size());
   const Json result{{"codec", options.codec},
@@ -133,7 +129,7 @@ void run_encode(const EncodeOptions& options, Session& session) {
                     {"frames", static_cast<std::int64_t>(frames)},
                     {"bytes", stream.size()},
                     {"bytes_per_frame", bytes / frames},
-                    {"ratio", raw_bytes(clips) / bytes},
+                    {"ratio", raw / bytes},
                     {"mean_joint_error_cm", error.mean_joint_error_cm},
                     {"max_joint_error_cm", error.max_joint_error_cm},
                     {"shell_error_cm", error.shell_error_cm},

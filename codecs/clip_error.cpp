@@ -55,4 +55,8 @@ ClipErrorSums clip_error(const Clip& original, const Clip& decoded, int first, i
   return out;
 }
 
+double raw_bytes(const Clip& clip) {
+  return 4.0 * clip.frames * (3.0 + 3.0 * static_cast<double>(clip.skeleton.rotating_joints().size()));
+}
+
 }  // namespace kinespace

@@ -85,7 +85,7 @@ void GroupingOptions::validate() const {
   require_option("refinements", refinements, 0, 100);
 }
 
-std::vector<FrameSpan> Grouping::ranges(int wanted, const FrameTable& table) const {
+std::vector<FrameSpan> SegmentGrouping::ranges(int wanted, const FrameTable& table) const {
   std::vector<FrameSpan> out;
   for (std::size_t s = 0; s < segments.size(); ++s) {
     if (group[s] != wanted) continue;
@@ -99,9 +99,10 @@ std::vector<FrameSpan> Grouping::ranges(int wanted, const FrameTable& table) con
   return out;
 }
 
-Grouping group_segments(const FrameTable& table, std::span<const FrameSpan> segments, const GroupingOptions& options) {
+SegmentGrouping group_segments(const FrameTable& table, std::span<const FrameSpan> segments,
+                               const GroupingOptions& options) {
   options.validate();
-  Grouping out;
+  SegmentGrouping out;
   out.segments.assign(segments.begin(), segments.end());
   out.group.assign(segments.size(), 0);
   out.groups = segments.empty() ? 0 : 1;

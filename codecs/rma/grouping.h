@@ -32,7 +32,7 @@ struct GroupingOptions {
   void validate() const;  // throws Error{usage} naming field, value and range
 };
 
-struct Grouping {
+struct SegmentGrouping {
   std::vector<FrameSpan> segments;  // in time, as given
   std::vector<int> group;           // of each segment; groups are numbered in the order of their first segments
   int groups = 0;
@@ -42,7 +42,7 @@ struct Grouping {
 };
 
 // Groups the segments (in time, covering the table).
-[[nodiscard]] Grouping group_segments(const FrameTable& table, std::span<const FrameSpan> segments,
-                                      const GroupingOptions& options = {});
+[[nodiscard]] SegmentGrouping group_segments(const FrameTable& table, std::span<const FrameSpan> segments,
+                                             const GroupingOptions& options = {});
 
 }  // namespace kinespace

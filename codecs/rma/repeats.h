@@ -49,7 +49,7 @@ struct RepeatClip {
 [[nodiscard]] std::string_view to_string(RepeatClip::Kind kind);
 
 struct RepeatAnalysis {
-  Grouping grouping;
+  SegmentGrouping grouping;
   std::vector<GroupSpace> spaces;  // of each group
   std::vector<RepeatClip> clips;   // in time
   // Share of all frames in clips of a kind, 0 to 1.

@@ -91,7 +91,7 @@ TEST(rma_grouping, segments_of_one_behaviour_meet_in_one_group) {
     add_clip(table, 600, [&](double t) { return which == 0 ? a(t / 61) : b(t / 47); });
     segments.push_back({table.frames - 600, table.frames});
   }
-  const Grouping grouping = group_segments(table, segments);
+  const SegmentGrouping grouping = group_segments(table, segments);
   EXPECT_EQ(grouping.groups, 2);
   EXPECT_EQ(grouping.group, behaviour);
   EXPECT_THAT(grouping.ranges(1, table), testing::ElementsAre(segments[1], segments[2], segments[4], segments[7]));
@@ -111,7 +111,8 @@ TEST(rma_grouping, two_groups_that_need_the_same_axes_are_one) {
 TEST(rma_grouping, ranges_join_neighbours_of_a_clip_and_stop_at_starts) {
   FrameTable table = empty_table(2, rate);
   for (int c = 0; c < 2; ++c) add_clip(table, 100, [](double t) { return Eigen::VectorXd::Constant(2, t); });
-  const Grouping grouping{.segments = {{0, 40}, {40, 100}, {100, 130}, {130, 200}}, .group = {0, 0, 0, 1}, .groups = 2};
+  const SegmentGrouping grouping{
+      .segments = {{0, 40}, {40, 100}, {100, 130}, {130, 200}}, .group = {0, 0, 0, 1}, .groups = 2};
   EXPECT_THAT(grouping.ranges(0, table), testing::ElementsAre(FrameSpan{0, 100}, FrameSpan{100, 130}));
 }
 
