@@ -35,7 +35,8 @@ ClipJudgement judge(const Clip& original, const Clip& decoded, const std::vector
   }
   const JointPositions p = joint_positions(decoded);
   for (int f = 1; f + 1 < decoded.frames; ++f) {
-    const bool seam = std::ranges::binary_search(seams, f);
+    // A seam lies between two frames; both are looked at.
+    const bool seam = std::ranges::binary_search(seams, f) || std::ranges::binary_search(seams, f + 1);
     for (int j = 0; j < p.joints; ++j) {
       const double change = std::abs((p.at(f + 1, j) - p.at(f, j)).norm() - (p.at(f, j) - p.at(f - 1, j)).norm());
       (seam ? out.at_seams : out.elsewhere).push_back(static_cast<float>(change * decoded.rate_hz));

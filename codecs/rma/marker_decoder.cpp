@@ -6,6 +6,7 @@
 #include "base/error.h"
 #include "codecs/rma/contact_ik.h"
 #include "codecs/rma/marker_clips.h"
+#include "codecs/rma/seam_easing.h"
 #include "codecs/rma/seams.h"
 #include "codecs/rma/spline_fit.h"
 
@@ -107,16 +108,23 @@ RootAlignment MarkerDecoder::alignment(const RootCode& root, int span) {
   return out;
 }
 
+std::vector<int> MarkerDecoder::seams(std::size_t clip) const {
+  std::vector<int> out;
+  int first = 0;
+  for (std::size_t p = first_clip_[clip]; p + 1 < first_clip_[clip + 1]; ++p) {
+    out.push_back(first += stream_.clips[p].frames);
+  }
+  return out;
+}
+
 Clip MarkerDecoder::decode_without_contacts(std::size_t clip) const {
   const ClipEntry& entry = table_.clips[clip];
   const MarkerRig& rig = rigs_[static_cast<std::size_t>(entry.skeleton)];
   const auto d = static_cast<std::size_t>(rig.dimensions());
-  std::vector<int> seams;
+  const std::vector<int> inner = seams(clip);
   std::vector<int> first{0};
-  for (std::size_t p = first_clip_[clip]; p < first_clip_[clip + 1]; ++p) {
-    first.push_back(first.back() + stream_.clips[p].frames);
-    if (first.back() < entry.frames) seams.push_back(first.back());
-  }
+  first.insert(first.end(), inner.begin(), inner.end());
+  first.push_back(entry.frames);
   // Frames come in rising order but for a few back at a seam, so two analysis clips at a time are enough.
   std::vector<std::vector<double>> parts(first.size() - 1);
   std::size_t current = 0;
@@ -139,7 +147,7 @@ Clip MarkerDecoder::decode_without_contacts(std::size_t clip) const {
       for (std::size_t k = 0; k < d; ++k) out[k] += h * axis[k];
     }
   };
-  SeamSmoother smoother(static_cast<int>(d), entry.frames, seams, smoothing_s * entry.rate_hz, raw);
+  SeamSmoother smoother(static_cast<int>(d), entry.frames, inner, smoothing_s * entry.rate_hz, raw);
   return clip_from_markers(entry, table_.skeletons[static_cast<std::size_t>(entry.skeleton)], rig, stream_.reference,
                            alignment(stream_.roots[clip], stream_.root_span), [&](int frame, std::span<double> out) {
                              raw(frame, out);
@@ -150,6 +158,7 @@ Clip MarkerDecoder::decode_without_contacts(std::size_t clip) const {
 Clip MarkerDecoder::decode(std::size_t clip) const {
   Clip out = decode_without_contacts(clip);
   hold_contacts(out, contact_tracks(stream_.contacts[clip], out));
+  ease_seams(out, seams(clip), stream_.seam_limit_cm_s);
   return out;
 }
 

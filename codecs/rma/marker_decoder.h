@@ -18,8 +18,10 @@ class MarkerDecoder {
 
   // A whole clip. Safe from several threads.
   [[nodiscard]] Clip decode(std::size_t clip) const;
-  // The same before its contacts are held to.
+  // The same before its contacts are held to, and seams eased.
   [[nodiscard]] Clip decode_without_contacts(std::size_t clip) const;
+  // The first frames of its analysis clips but the first.
+  [[nodiscard]] std::vector<int> seams(std::size_t clip) const;
 
   // The coefficients of an analysis clip, [axis][frame].
   [[nodiscard]] std::vector<double> coefficients(std::size_t analysis_clip) const;

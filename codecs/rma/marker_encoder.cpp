@@ -9,6 +9,7 @@
 #include "codecs/rma/adaptive_bits.h"
 #include "codecs/rma/contact_ik.h"
 #include "codecs/rma/marker_decoder.h"
+#include "codecs/rma/seam_easing.h"
 #include "codecs/rma/spline_fit.h"
 
 namespace kinespace {
@@ -280,17 +281,21 @@ void MarkerEncoder::code_clips(const MarkerSettings& settings, bool repeated, Ma
 void MarkerEncoder::measure(MarkerAttempt& attempt, bool contacts) const {
   MarkerStream& stream = attempt.stream;
   const MarkerDecoder decoder(table_, stream, "the stream");
-  std::vector<ClipErrorSums> parts(clips_.size());
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
-    progress_.check_stop();
-    Clip decoded = decoder.decode_without_contacts(c);
-    if (contacts) {
-      stream.contacts[c] = code_contacts(contacts_[c], decoded);
-      hold_contacts(decoded, contact_tracks(stream.contacts[c], decoded));
-    }
-    parts[c] = clip_error(clips_[c], decoded, 0, clips_[c].frames, 0);
-  });
-  for (const ClipErrorSums& part : parts) attempt.error.add(part);
+  std::vector<ClipSeams> seams;
+  for (std::size_t c = 0; c < clips_.size(); ++c) seams.push_back({.seams = decoder.seams(c), .breaks = {}});
+  const EasedError eased = measure_eased(
+      clips_, seams,
+      [&](std::size_t c) {
+        Clip decoded = decoder.decode_without_contacts(c);
+        if (contacts) {
+          stream.contacts[c] = code_contacts(contacts_[c], decoded);
+          hold_contacts(decoded, contact_tracks(stream.contacts[c], decoded));
+        }
+        return decoded;
+      },
+      progress_);
+  stream.seam_limit_cm_s = eased.limit_cm_s;
+  attempt.error.add(eased.error);
 }
 
 MarkerAttempt MarkerEncoder::attempt(const MarkerSettings& settings) const {

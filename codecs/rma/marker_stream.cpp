@@ -5,6 +5,7 @@
 #include <cstdlib>
 
 #include "codecs/rma/adaptive_bits.h"
+#include "codecs/rma/seam_easing.h"
 #include "codecs/rma/spline_fit.h"
 
 namespace kinespace {
@@ -346,6 +347,7 @@ void get_clip_list(ValueReader& in, MarkerStream& stream, std::int64_t frames, s
 Bytes pack_marker_stream(const MarkerStream& stream) {
   ValueWriter out(context_count);
   for (const int span : {stream.span, stream.root_span, stream.reference_span}) out.put(span, header);
+  out.put(stream.seam_limit_cm_s, header);
   put_reference_pose(out, stream.reference, pose);
   out.put(static_cast<std::int64_t>(stream.groups.size()), header);
   for (const MarkerGroup& group : stream.groups) put_group(out, group);
@@ -367,6 +369,7 @@ MarkerStream unpack_marker_stream(std::span<const std::byte> bytes, const ClipTa
   for (int* span : {&out.span, &out.root_span, &out.reference_span}) {
     *span = static_cast<int>(in.get_between(1, 512, header));
   }
+  out.seam_limit_cm_s = static_cast<int>(in.get_between(0, most_seam_limit, header));
   const int joints = static_cast<int>(table.skeletons.front().rotating_joints().size());
   out.reference = get_reference_pose(in, joints, pose);
   const std::int64_t groups = in.get_between(1, 4096, header);

@@ -75,6 +75,7 @@ struct MarkerStream {
   int span = 8;             // frames between regular control points, 1 to 512
   int root_span = 16;       // likewise, of the alignment
   int reference_span = 16;  // likewise, of references
+  int seam_limit_cm_s = 0;  // of seam_easing.h, 0 to most_seam_limit
   ReferencePose reference;
   std::vector<MarkerGroup> groups;
   std::vector<MarkerClip> clips;                   // in time: together all frames of all input clips

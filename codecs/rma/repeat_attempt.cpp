@@ -126,15 +126,19 @@ void RepeatEncoder::measure(Coding& coding) const {
   attempt.tables.contacts.resize(clips_.size());
   const RepeatDecoder decoder(
       attempt.clips, attempt.tables, *coding.layout, [&](std::size_t g) { return coding.groups[g]; }, "the stream");
-  std::vector<ClipErrorSums> parts(clips_.size());
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
-    progress_.check_stop();
-    Clip decoded = decoder.decode_without_contacts(c);
-    attempt.tables.contacts[c] = code_contacts(contacts_[c], decoded, slow_contacts);
-    hold_contacts(decoded, contact_tracks(attempt.tables.contacts[c], decoded), contact_blending_s);
-    parts[c] = clip_error(clips_[c], decoded, 0, clips_[c].frames, 0);
-  });
-  for (const ClipErrorSums& part : parts) attempt.error.add(part);
+  std::vector<ClipSeams> seams;
+  for (std::size_t c = 0; c < clips_.size(); ++c) seams.push_back(decoder.seams(c));
+  const EasedError eased = measure_eased(
+      clips_, seams,
+      [&](std::size_t c) {
+        Clip decoded = decoder.decode_without_contacts(c);
+        attempt.tables.contacts[c] = code_contacts(contacts_[c], decoded, slow_contacts);
+        hold_contacts(decoded, contact_tracks(attempt.tables.contacts[c], decoded), contact_blending_s);
+        return decoded;
+      },
+      progress_);
+  attempt.tables.seam_limit_cm_s = eased.limit_cm_s;
+  attempt.error.add(eased.error);
 }
 
 RepeatAttempt RepeatEncoder::attempt(double step, bool predict) const {

@@ -14,7 +14,8 @@ constexpr double smoothing_s = 0.2;  // to either side of a seam
 constexpr int prediction_context = contact_contexts;
 constexpr int jump_context = prediction_context + prediction_contexts;
 constexpr int point_context = jump_context + 1;
-constexpr int context_count = point_context + 1;
+constexpr int limit_context = point_context + 1;
+constexpr int context_count = limit_context + 1;
 
 }  // namespace
 
@@ -26,6 +27,7 @@ Bytes pack_repeats(const RepeatTables& tables, const ClipTable& clips) {
   for (const auto& level : tables.predicted.points.shift) {
     for (const std::int8_t shift : level) out.put(shift, point_context);
   }
+  out.put(tables.seam_limit_cm_s, limit_context);
   const Bytes numbers = std::move(out).finish();
   const bool any = std::ranges::any_of(tables.predictions, &WindowPrediction::used);
   ByteWriter all;
@@ -52,6 +54,7 @@ void unpack_repeats(std::span<const std::byte> bytes, const ClipTable& clips, st
   for (auto& level : out.predicted.points.shift) {
     for (std::int8_t& shift : level) shift = static_cast<std::int8_t>(in.get_between(-127, 127, point_context));
   }
+  out.seam_limit_cm_s = static_cast<int>(in.get_between(0, most_seam_limit, limit_context));
   in.expect_end();
   const int components = out.tables.basis.components;
   out.predicted.spectrum = out.tables.coding.spectrum;
@@ -157,20 +160,25 @@ std::vector<double> RepeatDecoder::window_vectors(std::size_t w) const {
   return out;
 }
 
+ClipSeams RepeatDecoder::seams(std::size_t clip) const {
+  ClipSeams out;
+  for (std::size_t w = layout_.plain.first_of_clip[clip] + 1; w < layout_.plain.first_of_clip[clip + 1]; ++w) {
+    (tables_.jumps[w] ? out.breaks : out.seams).push_back(layout_.plain.windows[w].first);
+  }
+  return out;
+}
+
 void RepeatDecoder::smooth_seams(std::size_t clip, std::vector<double>& vectors) const {
   const ClipEntry& entry = clips_.clips[clip];
   const auto frames = static_cast<std::size_t>(entry.frames);
   const std::size_t dimensions = vectors.size() / frames;
-  std::vector<int> seams, jumps;
-  for (std::size_t w = layout_.plain.first_of_clip[clip] + 1; w < layout_.plain.first_of_clip[clip + 1]; ++w) {
-    (tables_.jumps[w] ? jumps : seams).push_back(layout_.plain.windows[w].first);
-  }
-  if (seams.empty()) return;
+  const auto [inner, jumps] = seams(clip);
+  if (inner.empty()) return;
   const auto get = [&](int frame, std::span<double> out) {
     for (std::size_t k = 0; k < dimensions; ++k) out[k] = vectors[k * frames + static_cast<std::size_t>(frame)];
   };
   std::vector<double> frame(dimensions);
-  SeamSmoother smoother(static_cast<int>(dimensions), entry.frames, seams, smoothing_s * entry.rate_hz, get, jumps);
+  SeamSmoother smoother(static_cast<int>(dimensions), entry.frames, inner, smoothing_s * entry.rate_hz, get, jumps);
   for (int f = 0; f < entry.frames; ++f) {
     if (!smoother.touches(f)) continue;
     get(f, frame);
@@ -204,6 +212,8 @@ Clip RepeatDecoder::decode_without_contacts(std::size_t clip) const {
 Clip RepeatDecoder::decode(std::size_t clip) const {
   Clip out = decode_without_contacts(clip);
   hold_contacts(out, contact_tracks(tables_.contacts[clip], out), contact_blending_s);
+  const ClipSeams at = seams(clip);
+  ease_seams(out, at.seams, tables_.seam_limit_cm_s, at.breaks);
   return out;
 }
 

@@ -16,6 +16,7 @@
 #include "codecs/clip_table.h"
 #include "codecs/motion_space_tables.h"
 #include "codecs/rma/contact_trajectories.h"
+#include "codecs/rma/seam_easing.h"
 #include "codecs/rma/window_prediction.h"
 
 namespace kinespace {
@@ -29,6 +30,7 @@ struct RepeatTables {
   std::vector<WindowPrediction> predictions;       // by window
   std::vector<bool> jumps;                         // by window: it does not go on from the one before
   std::vector<std::vector<ContactCode>> contacts;  // by clip
+  int seam_limit_cm_s = 0;                         // of seam_easing.h, 0 to most_seam_limit
 };
 
 [[nodiscard]] Bytes pack_repeats(const RepeatTables& tables, const ClipTable& clips);
@@ -80,7 +82,9 @@ class RepeatDecoder {
   [[nodiscard]] std::vector<double> window_vectors(std::size_t w) const;
   // What the window is predicted to be.
   [[nodiscard]] std::vector<double> predicted_vectors(std::size_t w) const;
-  // A whole clip, before its contacts are held to and after.
+  // Where its windows meet.
+  [[nodiscard]] ClipSeams seams(std::size_t clip) const;
+  // A whole clip, before its contacts are held to and seams eased, and after.
   [[nodiscard]] Clip decode_without_contacts(std::size_t clip) const;
   [[nodiscard]] Clip decode(std::size_t clip) const;
 
