@@ -13,6 +13,7 @@
 #include "codecs/rma/repeats.h"
 #include "motion/read.h"
 #include "tests/codecs/rma_tables.h"
+#include "tests/support/allocation_meter.h"
 #include "tests/support/data.h"
 
 namespace kinespace {
@@ -238,6 +239,20 @@ TEST(rma_repeats, without_repeats_every_range_of_a_group_is_a_unique_clip) {
   const RepeatAnalysis analysis = analyse_repeats(table, {.find_repeats = false});
   expect_sound(analysis, table);
   EXPECT_EQ(analysis.share(Kind::unique), 1);
+}
+
+// Two and a half hours at 120 Hz, one behaviour: the largest group there can be.
+TEST(rma_repeats, memory_for_350_000_frames_stays_below_one_gibibyte) {
+  const Cycle cycle(12, 3);
+  FrameTable table = empty_table(12, 120);
+  add_clip(table, 350'000, [&](double t) { return cycle(t / 130 + 3 * std::sin(t / 2000)); });
+  const test::AllocationMeter meter;
+  const RepeatAnalysis analysis = analyse_repeats(table);
+  if (test::AllocationMeter::counts()) {
+    EXPECT_LT(meter.peak(), std::size_t{1} << 30);
+  }
+  expect_sound(analysis, table);
+  EXPECT_GT(analysis.share(Kind::repeated), 0.3);
 }
 
 TEST(rma_repeats, numbers_that_are_none_and_options_out_of_range_are_errors) {
