@@ -185,7 +185,10 @@ void run_info(InfoOptions& options, Session& session) {
 void add_info(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("info", "What is in a file");
   const auto options = std::make_shared<InfoOptions>();
-  command->add_option("FILE", options->files, "A clip (.bvh, .amc), a library (.kspace) or a stream (.ksm)")
+  command
+      ->add_option(
+          "FILE", options->files,
+          "A clip (.bvh, .amc), a library (.kspace) or a stream (.ksm); with --repeats clips and folders of them")
       ->required();
   command->add_option("--basis", options->basis, "The library that a stream was encoded with, if it was with one");
   command->add_flag("--json", options->json, "Print it as one JSON object");

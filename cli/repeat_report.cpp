@@ -12,6 +12,7 @@
 #include "codecs/rma/markers.h"
 #include "codecs/rma/repeat_picture.h"
 #include "codecs/rma/repeats.h"
+#include "fpca/library_builder.h"
 #include "motion/read.h"
 
 namespace kinespace::cli {
@@ -20,19 +21,20 @@ namespace {
 namespace fs = std::filesystem;
 
 std::vector<Clip> read_clips(const RepeatReportOptions& options, const Progress& progress) {
+  const std::vector<fs::path> files = find_motion_files(options.files);
   std::vector<Clip> out;
-  for (std::size_t i = 0; i < options.files.size(); ++i) {
-    progress.at("reading", static_cast<double>(i) / static_cast<double>(options.files.size()));
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    progress.at("reading", static_cast<double>(i) / static_cast<double>(files.size()));
     Session::check_stop();
     if (options.picture) {
-      for (const auto& file : files_read(options.files[i])) require_different_files(file, *options.picture);
+      for (const auto& file : files_read(files[i])) require_different_files(file, *options.picture);
     }
-    out.push_back(read_clip(options.files[i]));
+    out.push_back(read_clip(files[i]));
     if (out.back().rate_hz == out.front().rate_hz) continue;
     throw Error(ErrorKind::bad_input,
-                {.file = options.files[i].string(),
+                {.file = files[i].string(),
                  .found = fmt::format("{} frames per second", out.back().rate_hz),
-                 .expected = fmt::format("{}, as in {}", out.front().rate_hz, options.files.front().string()),
+                 .expected = fmt::format("{}, as in {}", out.front().rate_hz, files.front().string()),
                  .remedy = "give clips of one rate"});
   }
   return out;

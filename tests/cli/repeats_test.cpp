@@ -51,6 +51,15 @@ TEST_F(RepeatsCommand, a_walk_repeats_itself) {
   }
 }
 
+TEST_F(RepeatsCommand, a_folder_stands_for_the_clips_in_it) {
+  const TemporaryFolder walks;
+  write_clip(walks / "a.bvh", make_walk({.duration_s = 4}).clip);
+  write_clip(walks / "b.bvh", make_walk({.speed_m_s = 1.2, .duration_s = 4}).clip);
+  const CommandResult result = run_command({"info", walks.path().string(), "--repeats", "--json"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(json::parse(result.out)["clips"], 2);
+}
+
 TEST_F(RepeatsCommand, the_picture_is_an_svg_with_the_table_in_it) {
   const CommandResult result = run_command({"info", at("slow.bvh"), "--repeats", "--picture", at("p.svg")});
   ASSERT_EQ(result.code, 0) << result.err;
