@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "codecs/mesh/basis_cache.h"
 #include "codecs/mesh/mesh_codec.h"
 #include "mesh/mesh_error.h"
 #include "mesh/mesh_files.h"
@@ -34,11 +35,35 @@ bool is_stream_file(const fs::path& path) {
   return is_mesh_stream(file.bytes());
 }
 
+// An open stream, its smooth functions from a library where one was named.
+class OpenStream {
+ public:
+  OpenStream(std::span<const std::byte> bytes, const fs::path& shown, const std::optional<fs::path>& library,
+             Session& session) {
+    if (library) cache_.emplace(*library, [&session](const std::string& text) { session.note(text); });
+    reader_ = open_mesh_stream(bytes, shown.string(), cache_ ? &*cache_ : nullptr);
+  }
+  [[nodiscard]] const MeshStreamReader& operator*() const { return *reader_; }
+  [[nodiscard]] const MeshStreamReader* operator->() const { return reader_.get(); }
+  // Whether the functions came out of the library, all of them.
+  [[nodiscard]] bool basis_from_library() const { return cache_ && cache_->found() > 0 && cache_->computed() == 0; }
+
+ private:
+  std::optional<BasisCache> cache_;
+  std::unique_ptr<MeshStreamReader> reader_;
+};
+
+void add_library(CLI::App& command, std::optional<fs::path>& library) {
+  command.add_option(
+      "--library", library,
+      "Keep the stream's smooth functions in this library (made if there is none), or take them from it");
+}
+
 // A sequence of files, or of a stream.
-MeshSequence read_any(const fs::path& path, std::optional<double> rate_hz) {
-  if (!is_stream_file(path)) return read_mesh_sequence(path, rate_hz);
+MeshSequence read_any(const fs::path& path, const std::optional<fs::path>& library, Session& session) {
+  if (!is_stream_file(path)) return read_mesh_sequence(path);
   const MappedFile file(path);
-  return open_mesh_stream(file.bytes(), path.string())->decode_all();
+  return OpenStream(file.bytes(), path, library, session)->decode_all();
 }
 
 double number_of(const Bitstream& stream, const char* key) {
@@ -71,6 +96,7 @@ struct EncodeOptions {
   std::string profile = "standard";
   MeshCodecOptions codec_options;
   std::optional<double> rate_hz;
+  std::optional<fs::path> library;
   bool json = false;
 };
 
@@ -86,7 +112,7 @@ void run_encode(EncodeOptions& options, Session& session) {
   Session::check_stop();
   write_file_atomically(options.output, std::span<const std::byte>(stream));
   Json result{{"codec", options.codec}, {"output", options.output.string()}};
-  result.update(stream_fields(*open_mesh_stream(stream, options.output.string())));
+  result.update(stream_fields(*OpenStream(stream, options.output, options.library, session)));
   result["encode_s"] = seconds;
   print(result, options.json);
 }
@@ -95,6 +121,7 @@ struct DecodeOptions {
   fs::path stream;
   fs::path output;
   std::optional<int> from, to;
+  std::optional<fs::path> library;
   bool json = false;
 };
 
@@ -110,7 +137,7 @@ void run_decode(const DecodeOptions& options, const std::string& format, Session
   require_different_files(options.stream, options.output);
   const MappedFile file(options.stream);
   const auto start = Clock::now();
-  const auto reader = open_mesh_stream(file.bytes(), options.stream.string());
+  const OpenStream reader(file.bytes(), options.stream, options.library, session);
   const double opened = seconds_since(start);
   const int first = options.from.value_or(0);
   const int last = options.to.value_or(reader->layout().frames - 1);
@@ -126,6 +153,7 @@ void run_decode(const DecodeOptions& options, const std::string& format, Session
          {"frames", mesh.frames},
          {"open_s", opened},
          {"basis_s", reader->basis_seconds()},
+         {"basis_from_library", reader.basis_from_library()},
          {"decode_frames_per_s", mesh.frames / seconds}},
         options.json);
 }
@@ -134,6 +162,7 @@ struct CompareOptions {
   fs::path reference, other;
   std::optional<fs::path> picture;
   std::optional<int> frame;
+  std::optional<fs::path> library;
   bool json = false;
 };
 
@@ -152,10 +181,10 @@ int worst_frame(const MeshSequence& a, const MeshSequence& b) {
   return worst;
 }
 
-void run_compare(const CompareOptions& options) {
-  const MeshSequence a = read_any(options.reference, {});
+void run_compare(const CompareOptions& options, Session& session) {
+  const MeshSequence a = read_any(options.reference, options.library, session);
   Session::check_stop();
-  const MeshSequence b = read_any(options.other, {});
+  const MeshSequence b = read_any(options.other, options.library, session);
   Session::check_stop();
   const MeshError error = compare(a, b);
   Json result{{"vertices", error.vertices},
@@ -171,7 +200,7 @@ void run_compare(const CompareOptions& options) {
               {"max_error_over_diagonal", error.max_error_over_diagonal}};
   if (is_stream_file(options.other)) {
     const MappedFile file(options.other);
-    const auto reader = open_mesh_stream(file.bytes(), options.other.string());
+    const OpenStream reader(file.bytes(), options.other, options.library, session);
     const auto bytes = static_cast<std::int64_t>(file.bytes().size());
     result["bytes"] = bytes;
     result["bpvf"] = bits_per_vertex_and_frame(bytes, a);
@@ -244,6 +273,7 @@ void add_mesh_encode(CLI::App& mesh, Session& session) {
   command->add_option("--multi-resolution", codec.coarse_vertices,
                       "Code about so many vertices (10000, say); the others follow them");
   command->add_option("--rate", options->rate_hz, "Frames a second, where the files do not tell");
+  add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
   command->callback([options, &session] { run_encode(*options, session); });
 }
@@ -259,19 +289,21 @@ void add_mesh_decode(CLI::App& mesh, Session& session) {
       ->capture_default_str();
   command->add_option("--from", options->from, "The first frame (0)");
   command->add_option("--to", options->to, "The last frame");
+  add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
   command->callback([options, format, &session] { run_decode(*options, *format, session); });
 }
 
-void add_mesh_compare(CLI::App& mesh) {
+void add_mesh_compare(CLI::App& mesh, Session& session) {
   CLI::App* command = mesh.add_subcommand("compare", "How far mesh sequence B is from the reference A");
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("A", options->reference, "The reference: files or a stream")->required();
   command->add_option("B", options->other, "The sequence to judge: files or a stream")->required();
   command->add_option("--picture", options->picture, "Draw original, decoded and error (blue to red) to this PNG");
   command->add_option("--frame", options->frame, "The frame to draw; by default the one with the largest error");
+  add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the measures as one JSON object");
-  command->callback([options] { run_compare(*options); });
+  command->callback([options, &session] { run_compare(*options, session); });
 }
 
 void add_mesh_info(CLI::App& mesh) {
@@ -289,7 +321,7 @@ void add_mesh(CLI::App& app, Session& session) {
   mesh->require_subcommand(1);
   add_mesh_encode(*mesh, session);
   add_mesh_decode(*mesh, session);
-  add_mesh_compare(*mesh);
+  add_mesh_compare(*mesh, session);
   add_mesh_info(*mesh);
 }
 

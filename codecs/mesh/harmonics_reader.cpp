@@ -18,7 +18,7 @@ Points rows_of(const Points& all, std::span<const std::int32_t> kept) {
 
 class HarmonicsReader final : public MeshStreamReader {
  public:
-  explicit HarmonicsReader(Bitstream stream) : stream_(std::move(stream)) {
+  HarmonicsReader(Bitstream stream, BasisCache* cache) : stream_(std::move(stream)) {
     const HarmonicsSetup setup = get_setup(stream_.section("setup"), stream_.size(), stream_.source());
     KeyMesh mesh = unpack_key_mesh(stream_.section("surface"), stream_.section("order"), setup.layout.vertices,
                                    setup.layout.triangles, 1, stream_.source());
@@ -29,9 +29,10 @@ class HarmonicsReader final : public MeshStreamReader {
     if (setup.coarse_vertices > 0) {
       const Decimation decimation = read_decimation(stream_, setup);
       refinement = std::make_shared<Refinement>(key, mesh.triangles, decimation);
-      space = std::make_shared<HarmonicsSpace>(rows_of(key, decimation.kept), decimation.triangles, setup.functions);
+      space =
+          std::make_shared<HarmonicsSpace>(rows_of(key, decimation.kept), decimation.triangles, setup.functions, cache);
     } else {
-      space = std::make_shared<HarmonicsSpace>(key, mesh.triangles, setup.functions);
+      space = std::make_shared<HarmonicsSpace>(key, mesh.triangles, setup.functions, cache);
     }
     basis_seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     layout_ = empty_sequence(setup.layout, std::move(mesh.triangles));
@@ -77,8 +78,8 @@ class HarmonicsReader final : public MeshStreamReader {
 
 }  // namespace
 
-std::unique_ptr<MeshStreamReader> open_harmonics(Bitstream stream) {
-  return std::make_unique<HarmonicsReader>(std::move(stream));
+std::unique_ptr<MeshStreamReader> open_harmonics(Bitstream stream, BasisCache* cache) {
+  return std::make_unique<HarmonicsReader>(std::move(stream), cache);
 }
 
 }  // namespace kinespace

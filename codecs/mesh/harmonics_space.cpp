@@ -5,6 +5,7 @@
 #include <bit>
 #include <utility>
 
+#include "codecs/mesh/basis_cache.h"
 #include "codecs/range_coder.h"
 #include "mesh/deformation.h"
 #include "mesh/smooth_basis.h"
@@ -73,8 +74,10 @@ struct HarmonicsSpace::Basis {
   SmoothBasis functions;
 };
 
-HarmonicsSpace::HarmonicsSpace(Points key, std::span<const Triangle> triangles, int functions)
-    : HarmonicsSpace(key, triangles, Basis{smooth_basis(key, triangles, {.functions = functions})}) {}
+HarmonicsSpace::HarmonicsSpace(Points key, std::span<const Triangle> triangles, int functions, BasisCache* cache)
+    : HarmonicsSpace(key, triangles,
+                     Basis{cache != nullptr ? cache->smooth(key, triangles, functions)
+                                            : smooth_basis(key, triangles, {.functions = functions})}) {}
 
 HarmonicsSpace::HarmonicsSpace(Points key, std::span<const Triangle> triangles, const Basis& basis)
     : projection_(basis.functions.functions),

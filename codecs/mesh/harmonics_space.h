@@ -21,9 +21,12 @@
 
 namespace kinespace {
 
+class BasisCache;
+
 class HarmonicsSpace {
  public:
-  HarmonicsSpace(Points key, std::span<const Triangle> triangles, int functions);
+  // `cache`: where the functions may be kept (basis_cache.h), or none.
+  HarmonicsSpace(Points key, std::span<const Triangle> triangles, int functions, BasisCache* cache = nullptr);
 
   [[nodiscard]] const Projection& projection() const { return projection_; }
   [[nodiscard]] const Coefficients& key_coefficients() const { return key_coefficients_; }

@@ -81,7 +81,7 @@ class HarmonicsFrames {
   std::vector<Block> blocks_;
 };
 
-[[nodiscard]] std::unique_ptr<MeshStreamReader> open_harmonics(Bitstream stream);
+[[nodiscard]] std::unique_ptr<MeshStreamReader> open_harmonics(Bitstream stream, BasisCache* cache = nullptr);
 // Of one block: key-frame coefficients plus what moves. `motion` has a node for each function.
 [[nodiscard]] Coefficients coefficients_of(const Coefficients& key, const MovingPart& motion, int frame);
 

@@ -90,15 +90,16 @@ bool is_mesh_stream(std::span<const std::byte> bytes) {
   return Bitstream::has_magic(bytes) && Bitstream::parse_prefix(bytes, "").kind().starts_with(kind_prefix);
 }
 
-std::unique_ptr<MeshStreamReader> open_mesh_stream(std::span<const std::byte> bytes, std::string source) {
+std::unique_ptr<MeshStreamReader> open_mesh_stream(std::span<const std::byte> bytes, std::string source,
+                                                   BasisCache* cache) {
   Bitstream stream = Bitstream::parse(bytes, std::move(source));
   const std::string& kind = stream.kind();
   const std::string_view codec =
       kind.starts_with(kind_prefix) ? std::string_view(kind).substr(kind_prefix.size()) : std::string_view();
   const std::string* profile = stream.find_option("profile");
   if (codec == names[0]) {
-    return profile != nullptr && *profile == "paper" ? open_paper_harmonics(std::move(stream))
-                                                     : open_harmonics(std::move(stream));
+    return profile != nullptr && *profile == "paper" ? open_paper_harmonics(std::move(stream), cache)
+                                                     : open_harmonics(std::move(stream), cache);
   }
   if (codec == names[1]) return open_trajectory_pca(std::move(stream));
   if (codec == names[2]) return open_draco_frames(std::move(stream));

@@ -31,6 +31,8 @@
 
 namespace kinespace {
 
+class BasisCache;  // codecs/mesh/basis_cache.h
+
 enum class MeshProfile : std::uint8_t {
   standard,  // one key-frame, smooth basis, principal components or cosines over time, coded residual
   paper,     // chen2019: clusters, manifold harmonics of each key-frame, linear prediction, deformation transfer
@@ -93,8 +95,10 @@ class MeshStreamReader {
 // Whether the bytes are a stream of a mesh sequence.
 [[nodiscard]] bool is_mesh_stream(std::span<const std::byte> bytes);
 // The bytes must outlive the reader. Throws Error{bad_input} for anything that is not a whole stream, and where its
-// smooth functions come out other than they were (see above).
-[[nodiscard]] std::unique_ptr<MeshStreamReader> open_mesh_stream(std::span<const std::byte> bytes, std::string source);
+// smooth functions come out other than they were (see above). `cache`: gives the smooth functions without a solve where
+// it has them, and keeps them where not; the frames are the same with and without.
+[[nodiscard]] std::unique_ptr<MeshStreamReader> open_mesh_stream(std::span<const std::byte> bytes, std::string source,
+                                                                 BasisCache* cache = nullptr);
 
 // 8 * bytes / (vertices * frames): bits per vertex and frame.
 [[nodiscard]] double bits_per_vertex_and_frame(std::int64_t bytes, const MeshSequence& layout);

@@ -13,6 +13,7 @@
 
 #include "base/error.h"
 #include "codecs/integer_model.h"
+#include "codecs/mesh/basis_cache.h"
 #include "codecs/mesh/key_mesh.h"
 #include "codecs/mesh/linear_prediction.h"
 #include "codecs/mesh/measured_mesh.h"
@@ -34,8 +35,10 @@ constexpr double key_steps = 0.5;  // step of the key-frames over the root mean 
 class Cluster {
  public:
   Cluster(Points key, std::span<const Triangle> triangles, int functions)
-      : Cluster(key, triangles,
-                manifold_harmonics(key, triangles, {.functions = functions, .tolerance = 1e-7}).functions) {}
+      : Cluster(key, triangles, manifold_harmonics(key, triangles, options(functions)).functions) {}
+  // `checksum`: of the harmonics that are wanted.
+  Cluster(Points key, std::span<const Triangle> triangles, int functions, BasisCache& cache, std::uint64_t checksum)
+      : Cluster(key, triangles, cache.harmonics(key, triangles, options(functions), checksum)) {}
 
   [[nodiscard]] std::uint64_t checksum() const { return checksum_; }
   [[nodiscard]] const Projection& projection() const { return projection_; }
@@ -56,6 +59,7 @@ class Cluster {
   }
 
  private:
+  static HarmonicsOptions options(int functions) { return {.functions = functions, .tolerance = 1e-7}; }
   Cluster(Points key, std::span<const Triangle> triangles, const Eigen::MatrixXd& functions)
       : key_(std::move(key)), checksum_(basis_checksum(functions)), projection_(functions), key_row_(row_of(key_)) {
     const Points low = projection_.synthesise(projection_.coefficients(key_));
@@ -163,7 +167,7 @@ struct PaperFrames {
 
 class PaperReader final : public MeshStreamReader {
  public:
-  explicit PaperReader(Bitstream stream) : stream_(std::move(stream)) {
+  PaperReader(Bitstream stream, BasisCache* cache) : stream_(std::move(stream)) {
     const Setup setup = get_setup(stream_.section("setup"), stream_.size(), stream_.source());
     KeyMesh mesh = unpack_key_mesh(stream_.section("surface"), stream_.section("order"), setup.layout.vertices,
                                    setup.layout.triangles, setup.clusters, stream_.source());
@@ -173,8 +177,10 @@ class PaperReader final : public MeshStreamReader {
     const auto start = std::chrono::steady_clock::now();
     for (int j = 0; j < setup.clusters; ++j) {
       const auto number = static_cast<std::size_t>(j);
-      frames_.clusters.push_back(
-          std::make_shared<Cluster>(setup.grid.points(mesh.keys[number]), mesh.triangles, setup.functions));
+      const Points key = setup.grid.points(mesh.keys[number]);
+      frames_.clusters.push_back(cache != nullptr ? std::make_shared<Cluster>(key, mesh.triangles, setup.functions,
+                                                                              *cache, setup.checksums[number])
+                                                  : std::make_shared<Cluster>(key, mesh.triangles, setup.functions));
       if (frames_.clusters.back()->checksum() != setup.checksums[number]) {
         throw Error(ErrorKind::bad_input, {.file = stream_.source(),
                                            .found = "manifold harmonics other than the encoder's (their checksum)",
@@ -409,8 +415,8 @@ Bytes encode_paper_harmonics(const MeshSequence& mesh, const MeshCodecOptions& o
                                  .remedy = "ask for more bases or clusters, or use the standard profile"});
 }
 
-std::unique_ptr<MeshStreamReader> open_paper_harmonics(Bitstream stream) {
-  return std::make_unique<PaperReader>(std::move(stream));
+std::unique_ptr<MeshStreamReader> open_paper_harmonics(Bitstream stream, BasisCache* cache) {
+  return std::make_unique<PaperReader>(std::move(stream), cache);
 }
 
 }  // namespace kinespace

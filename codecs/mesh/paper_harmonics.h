@@ -20,6 +20,6 @@ namespace kinespace {
 
 [[nodiscard]] Bytes encode_paper_harmonics(const MeshSequence& mesh, const MeshCodecOptions& options);
 // Throws Error{bad_input} also where the harmonics come out other than the encoder's.
-[[nodiscard]] std::unique_ptr<MeshStreamReader> open_paper_harmonics(Bitstream stream);
+[[nodiscard]] std::unique_ptr<MeshStreamReader> open_paper_harmonics(Bitstream stream, BasisCache* cache = nullptr);
 
 }  // namespace kinespace

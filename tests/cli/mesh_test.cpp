@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "mesh/mesh_files.h"
+#include "storage/library.h"
 #include "tests/cli/run_command.h"
 #include "tests/mesh/sample_meshes.h"
 #include "tests/support/data.h"
@@ -65,6 +66,45 @@ TEST_F(MeshCommand, info_describes_sequences_and_streams) {
   const json stream = run({"info", at("draco.ksm")});
   EXPECT_EQ(stream["codec"], "mesh-draco");
   EXPECT_EQ(stream["vertices"], sequence["vertices"]);
+}
+
+TEST_F(MeshCommand, functions_kept_in_a_library_change_nothing_but_the_time) {
+  run({"encode", at("tube"), "-o", at("kept.ksm"), "--library", at("meshes.kspace")});
+  const json plain = run({"decode", at("kept.ksm"), "-o", at("plain")});
+  EXPECT_EQ(plain["basis_from_library"], false);
+  EXPECT_GT(plain["basis_s"], 0);
+  EXPECT_EQ(run({"decode", at("kept.ksm"), "-o", at("kept"), "--library", at("meshes.kspace")})["basis_from_library"],
+            true);
+  EXPECT_EQ(read_text(at("plain") + "/positions.npy"), read_text(at("kept") + "/positions.npy"));
+  EXPECT_EQ(run({"compare", at("tube"), at("kept.ksm"), "--library", at("meshes.kspace")})["kg"],
+            run({"compare", at("tube"), at("kept.ksm")})["kg"]);
+  // A library that decode has to make; one that is none.
+  EXPECT_EQ(run({"decode", at("kept.ksm"), "-o", at("kept2"), "--library", at("new.kspace")})["basis_from_library"],
+            false);
+  EXPECT_EQ(run({"decode", at("kept.ksm"), "-o", at("kept3"), "--library", at("new.kspace")})["basis_from_library"],
+            true);
+  EXPECT_NE(fails({"decode", at("kept.ksm"), "-o", at("kept4"), "--library", at("kept.ksm")}, 1).find("kept.ksm"),
+            std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(at("kept4")));
+}
+
+TEST_F(MeshCommand, a_damaged_basis_in_the_library_is_noted_and_mended) {
+  run({"encode", at("tube"), "-o", at("mended.ksm"), "--library", at("damaged.kspace")});
+  {
+    Library library = Library::open(at("damaged.kspace"));
+    const std::string key = library.artifact_keys("mesh basis").at(0);
+    Bytes blob = library.artifact("mesh basis", key).value();
+    blob[blob.size() / 2] ^= std::byte{1};
+    library.put_artifact("mesh basis", key, blob);
+  }
+  const std::vector<std::string> decode = {"mesh",       "decode",    at("mended.ksm"),    "-o",
+                                           at("mended"), "--library", at("damaged.kspace")};
+  const CommandResult first = run_command(decode);
+  EXPECT_EQ(first.code, 0) << first.err;
+  EXPECT_NE(first.err.find("damaged"), std::string::npos) << first.err;
+  const CommandResult second = run_command(decode);
+  EXPECT_EQ(second.code, 0);
+  EXPECT_EQ(second.err.find("damaged.kspace"), std::string::npos) << second.err;
 }
 
 TEST_F(MeshCommand, wrong_input_is_told_by_name) {
