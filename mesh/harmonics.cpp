@@ -6,14 +6,12 @@
 #include <numeric>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SparseCholesky>
-#include <Spectra/SymEigsShiftSolver.h>
 #include <fmt/format.h>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "mesh/connectivity.h"
+#include "mesh/eigenpairs.h"
 #include "mesh/laplacian.h"
 
 namespace kinespace {
@@ -21,64 +19,6 @@ namespace {
 
 [[noreturn]] void fail_usage(const char* field, const std::string& value, const std::string& range) {
   throw Error(ErrorKind::usage, {.found = fmt::format("{} = {}", field, value), .expected = range});
-}
-
-// x -> (A - sigma I)^-1 x for Spectra: A - sigma I is positive definite, which its own operator does not know.
-class ShiftedInverse {
- public:
-  using Scalar = double;
-
-  explicit ShiftedInverse(const SparseMatrix& matrix) : matrix_(matrix) {}
-
-  [[nodiscard]] Eigen::Index rows() const { return matrix_.rows(); }
-  [[nodiscard]] Eigen::Index cols() const { return matrix_.cols(); }
-  void set_shift(double sigma) {
-    SparseMatrix identity(rows(), cols());
-    identity.setIdentity();
-    solver_.compute(matrix_ - sigma * identity);
-    if (solver_.info() != Eigen::Success) {
-      throw Error(ErrorKind::machine, {.found = "the Laplacian cannot be factorised"});
-    }
-  }
-  void perform_op(const double* x, double* y) const {
-    Eigen::Map<Eigen::VectorXd>(y, rows()) = solver_.solve(Eigen::Map<const Eigen::VectorXd>(x, rows()));
-  }
-
- private:
-  const SparseMatrix& matrix_;
-  Eigen::SimplicialLDLT<SparseMatrix> solver_;
-};
-
-// Eigenpairs of one component.
-struct Pairs {
-  Eigen::MatrixXd vectors;
-  Eigen::VectorXd values;  // ascending
-};
-
-// So few vertices, or so many functions of them, that a dense solver is as good.
-Pairs dense_pairs(const SparseMatrix& matrix, int count) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(Eigen::MatrixXd{matrix});
-  if (solver.info() != Eigen::Success) {
-    throw Error(ErrorKind::machine, {.found = "the eigenproblem of the mesh does not converge"});
-  }
-  return {solver.eigenvectors().leftCols(count), solver.eigenvalues().head(count)};
-}
-
-Pairs lanczos_pairs(const SparseMatrix& matrix, int count, double tolerance) {
-  constexpr int most_restarts = 100;
-  const double mean_diagonal = matrix.diagonal().mean();
-  const double sigma = -1e-6 * (mean_diagonal > 0 ? mean_diagonal : 1);
-  ShiftedInverse inverse(matrix);
-  const auto space = std::min<Eigen::Index>(matrix.rows(), count + std::max(20, count * 3 / 5));
-  Spectra::SymEigsShiftSolver<ShiftedInverse> solver(inverse, count, space, sigma);
-  solver.init();
-  solver.compute(Spectra::SortRule::LargestMagn, most_restarts, tolerance, Spectra::SortRule::SmallestAlge);
-  if (solver.info() != Spectra::CompInfo::Successful) {
-    throw Error(ErrorKind::machine,
-                {.found = fmt::format("the eigenproblem of the mesh does not converge for {} functions", count),
-                 .remedy = "ask for another number of functions"});
-  }
-  return {solver.eigenvectors(), solver.eigenvalues()};
 }
 
 // M^-1/2 S M^-1/2: the symmetric problem with the same eigenvalues.
@@ -102,7 +42,7 @@ class ComponentPairs {
     if (count() >= wanted) return;
     constexpr int small = 600;
     const bool dense = most() <= small || wanted > most() / 2;
-    pairs_ = dense ? dense_pairs(matrix_, wanted) : lanczos_pairs(matrix_, wanted, tolerance_);
+    pairs_ = dense ? smallest_eigenpairs_dense(matrix_, wanted) : smallest_eigenpairs(matrix_, wanted, tolerance_);
   }
   void copy_to(Eigen::Ref<Eigen::VectorXd> function, int k) const {
     function.setZero();
@@ -130,7 +70,7 @@ class ComponentPairs {
   std::vector<int> vertices_;  // ascending
   SparseMatrix matrix_;
   double tolerance_;
-  Pairs pairs_;
+  Eigenpairs pairs_;
 };
 
 // Component by component: one Lanczos process cannot be trusted to find an eigenvalue as often as it occurs, and zero
@@ -145,7 +85,7 @@ class SmoothestPairs {
     for (auto& of_one : vertices) parts_.emplace_back(problem, std::move(of_one), tolerance);
   }
 
-  [[nodiscard]] Pairs find(int count) {
+  [[nodiscard]] Eigenpairs find(int count) {
     const auto all = static_cast<double>(std::accumulate(
         parts_.begin(), parts_.end(), 0, [](int sum, const ComponentPairs& part) { return sum + part.most(); }));
     for (ComponentPairs& part : parts_) {
@@ -184,9 +124,9 @@ class SmoothestPairs {
     return all;
   }
 
-  [[nodiscard]] Pairs gathered(const std::vector<Choice>& chosen, Eigen::Index vertices) const {
-    Pairs out{Eigen::MatrixXd(vertices, static_cast<Eigen::Index>(chosen.size())),
-              Eigen::VectorXd(static_cast<Eigen::Index>(chosen.size()))};
+  [[nodiscard]] Eigenpairs gathered(const std::vector<Choice>& chosen, Eigen::Index vertices) const {
+    Eigenpairs out{Eigen::MatrixXd(vertices, static_cast<Eigen::Index>(chosen.size())),
+                   Eigen::VectorXd(static_cast<Eigen::Index>(chosen.size()))};
     for (std::size_t i = 0; i < chosen.size(); ++i) {
       const auto column = static_cast<Eigen::Index>(i);
       parts_[chosen[i].part].copy_to(out.vectors.col(column), chosen[i].k);
@@ -226,7 +166,7 @@ Harmonics manifold_harmonics(const Points& points, std::span<const Triangle> tri
   out.mass = options.area_weighted ? lumped_mass(points, triangles) : Eigen::VectorXd(Eigen::VectorXd::Ones(vertices));
   const Components components = connected_components(Neighbours(vertices, triangles));
   SmoothestPairs solver(options.area_weighted ? scaled(stiffness, out.mass) : stiffness, components, options.tolerance);
-  Pairs pairs = solver.find(options.functions);
+  Eigenpairs pairs = solver.find(options.functions);
   out.eigenvalues = std::move(pairs.values);
   out.functions = std::move(pairs.vectors);
   if (options.area_weighted) out.functions = out.mass.cwiseSqrt().cwiseInverse().asDiagonal() * out.functions;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "mesh/eigenpairs.h"
 #include "mesh/laplacian.h"
 #include "tests/mesh/sample_meshes.h"
 
@@ -61,6 +62,48 @@ TEST_P(HarmonicsOf, several_components_have_a_constant_each) {
 }
 INSTANTIATE_TEST_SUITE_P(Masses, HarmonicsOf, testing::Bool(),
                          [](const auto& param) { return param.param ? "areas" : "ones"; });
+
+// A grid of side x side vertices, joined at its borders to a torus: every eigenvalue occurs several times.
+std::vector<Triangle> torus(int side) {
+  std::vector<Triangle> out;
+  const auto at = [&](int i, int j) { return static_cast<std::int32_t>((i % side) * side + j % side); };
+  for (int i = 0; i < side; ++i) {
+    for (int j = 0; j < side; ++j) {
+      out.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+      out.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+  }
+  return out;
+}
+
+TEST(Eigenpairs, of_several_bands_miss_no_copy_of_a_multiple_eigenvalue) {
+  constexpr int side = 26, count = 250;
+  const SparseMatrix matrix = uniform_stiffness(side * side, torus(side));
+  const Eigenpairs dense = smallest_eigenpairs_dense(matrix, count);
+  const Eigenpairs bands = smallest_eigenpairs(matrix, count, 1e-9);
+  EXPECT_LT((dense.values - bands.values).cwiseAbs().maxCoeff(), 1e-9);
+  const Eigen::MatrixXd gram = bands.vectors.transpose() * bands.vectors;
+  EXPECT_LT((gram - Eigen::MatrixXd::Identity(count, count)).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT((matrix * bands.vectors - bands.vectors * bands.values.asDiagonal()).cwiseAbs().maxCoeff(), 1e-8);
+}
+
+TEST(Eigenpairs, of_several_bands_are_those_of_a_dense_solver) {
+  constexpr int count = 300;
+  const MeshSequence mesh = bending_tube(700, 1, 1.2);
+  const SparseMatrix matrix = cotangent_stiffness(frame_points(mesh, 0), mesh.triangles);
+  const Eigenpairs dense = smallest_eigenpairs_dense(matrix, mesh.vertices);
+  for (const int wanted : {1, 2, 30, 59, 61, count}) {
+    const Eigenpairs bands = smallest_eigenpairs(matrix, wanted, 1e-9);
+    ASSERT_EQ(bands.values.size(), wanted);
+    EXPECT_LT((dense.values.head(wanted) - bands.values).cwiseAbs().maxCoeff(), 1e-9) << wanted;
+  }
+  // Both span the same space, up to the last gap.
+  const Eigenpairs bands = smallest_eigenpairs(matrix, count, 1e-9);
+  int last = count;
+  while (dense.values[last] - dense.values[last - 1] < 1e-6) --last;
+  const Eigen::MatrixXd turned = dense.vectors.leftCols(last).transpose() * bands.vectors.leftCols(last);
+  EXPECT_LT((turned * turned.transpose() - Eigen::MatrixXd::Identity(last, last)).cwiseAbs().maxCoeff(), 1e-7);
+}
 
 TEST(Harmonics, come_out_the_same_every_time) {
   const MeshSequence mesh = bending_tube(1200, 1, 1.5);
