@@ -18,11 +18,6 @@ constexpr int ladder = 15;
 constexpr double shell_ratio = 1.45;  // held on the average, so that single clips keep to 1.6
 constexpr std::uint64_t most_rungs = 64;
 
-void put_part(ByteWriter& out, const Bytes& part) {
-  put_varint(out, part.size());
-  out.put_bytes(part);
-}
-
 }  // namespace
 
 MotionSpaceBasis::MotionSpaceBasis(std::vector<Skeleton> skeletons, std::vector<MotionSpaceTables> rungs)
@@ -52,13 +47,13 @@ Bytes MotionSpaceBasis::pack() const {
 
 MotionSpaceBasis MotionSpaceBasis::unpack(std::span<const std::byte> bytes, const std::string& source) {
   ByteReader in(bytes, source);
-  std::vector<Skeleton> skeletons = unpack_skeletons(in.take(get_count(in, 1, "bytes of skeletons")), source);
+  std::vector<Skeleton> skeletons = unpack_skeletons(get_part(in, "bytes of skeletons"), source);
   const auto joints = static_cast<int>(skeletons.front().rotating_joints().size());
   const std::uint64_t count = get_varint(in);
   if (count < 1 || count > most_rungs) in.fail("a basis of no or too many rungs", "1 to 64");
   std::vector<MotionSpaceTables> rungs;
   for (std::uint64_t r = 0; r < count; ++r) {
-    rungs.push_back(unpack_motion_space_tables(in.take(get_count(in, 1, "bytes of a rung")), joints, source));
+    rungs.push_back(unpack_motion_space_tables(get_part(in, "bytes of a rung"), joints, source));
     const bool fits = rungs.back().reference.steps == rungs.front().reference.steps &&
                       (r == 0 || rungs.back().step > rungs[r - 1].step);
     if (!fits) in.fail("rungs that do not belong together", "one reference pose, steps that grow (damaged)");

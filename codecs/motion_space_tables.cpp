@@ -10,15 +10,6 @@
 namespace kinespace {
 namespace {
 
-void put_part(ByteWriter& out, const Bytes& part) {
-  put_varint(out, part.size());
-  out.put_bytes(part);
-}
-
-std::span<const std::byte> get_part(ByteReader& in) {
-  return in.take(get_count(in, 1, "bytes of a table"));
-}
-
 Bytes pack_points(const ReconstructionPoints& points) {
   IntegerWriter out;
   for (const auto& row : points.shift) {
@@ -100,10 +91,10 @@ MotionSpaceTables unpack_motion_space_tables(std::span<const std::byte> bytes, i
     in.fail(std::to_string(components) + " components", "at most " + std::to_string(dimensions));
   }
   const auto count = static_cast<int>(components);
-  out.basis = unpack_basis(get_part(in), dimensions, count, source);
-  out.coding.spectrum = unpack_spectrum(get_part(in), count, source);
-  out.coding.start = unpack_start(get_part(in), source);
-  out.coding.points = unpack_points(get_part(in), source);
+  out.basis = unpack_basis(get_part(in, "bytes of a table"), dimensions, count, source);
+  out.coding.spectrum = unpack_spectrum(get_part(in, "bytes of a table"), count, source);
+  out.coding.start = unpack_start(get_part(in, "bytes of a table"), source);
+  out.coding.points = unpack_points(get_part(in, "bytes of a table"), source);
   in.expect_end();
   return out;
 }
@@ -125,7 +116,7 @@ MotionSpaceTables unpack_own_tables(std::span<const std::byte> bytes, std::span<
   MotionSpaceTables out = rungs[rung];
   out.step = get_step(in);
   out.group_frames = get_group_frames(in);
-  out.coding.spectrum = unpack_spectrum(get_part(in), out.basis.components, source);
+  out.coding.spectrum = unpack_spectrum(get_part(in, "bytes of a table"), out.basis.components, source);
   in.expect_end();
   return out;
 }

@@ -363,9 +363,8 @@ PreparedClip unpack_prepared(std::span<const std::byte> bytes, const std::string
     }
     if (cuts == 0) in.fail("a run without frames", "one frame or more");
   }
-  out.skeleton = unpack_skeleton(in.take(get_count(in, 1, "bytes")), source);
-  out.curves.side_tracks =
-      unpack_side_tracks(in.take(get_count(in, 1, "bytes")), static_cast<int>(frames), out.skeleton, source);
+  out.skeleton = unpack_skeleton(get_part(in, "bytes"), source);
+  out.curves.side_tracks = unpack_side_tracks(get_part(in, "bytes"), static_cast<int>(frames), out.skeleton, source);
   const int curves = curve_layout(out.skeleton).curve_count();
   const auto values = in.get_array<float>(frames * static_cast<std::uint64_t>(curves));
   in.expect_end();

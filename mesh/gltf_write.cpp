@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "mesh/mesh_formats.h"
+#include "motion/gltf_arrays.h"
 
 namespace kinespace {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 // are 1 for its own target and 0 for the rest.
 class Writer {
  public:
-  explicit Writer(const MeshSequence& mesh) : mesh_(mesh) { model_.buffers.emplace_back(); }
+  explicit Writer(const MeshSequence& mesh) : mesh_(mesh), arrays_(model_) {}
 
   tinygltf::Model write() && {
     model_.asset.version = "2.0";
@@ -26,42 +27,6 @@ class Writer {
   }
 
  private:
-  template <typename T>
-  int add(std::span<const T> values, int component, int type, std::size_t width, int target = 0) {
-    auto& data = model_.buffers[0].data;
-    tinygltf::BufferView view;
-    view.buffer = 0;
-    view.byteOffset = data.size();
-    view.byteLength = values.size_bytes();
-    view.target = target;
-    const auto* raw = reinterpret_cast<const unsigned char*>(values.data());
-    data.insert(data.end(), raw, raw + values.size_bytes());
-    model_.bufferViews.push_back(std::move(view));
-    tinygltf::Accessor accessor;
-    accessor.bufferView = static_cast<int>(model_.bufferViews.size()) - 1;
-    accessor.componentType = component;
-    accessor.type = type;
-    accessor.count = values.size() / width;
-    model_.accessors.push_back(std::move(accessor));
-    return static_cast<int>(model_.accessors.size()) - 1;
-  }
-
-  // The format wants the range of positions and of times.
-  int add_ranged(std::span<const float> values, int type, std::size_t width, int target = 0) {
-    const int index = add(values, TINYGLTF_COMPONENT_TYPE_FLOAT, type, width, target);
-    auto& accessor = model_.accessors[static_cast<std::size_t>(index)];
-    for (std::size_t c = 0; c < width; ++c) {
-      float low = values[c], high = values[c];
-      for (std::size_t i = c; i < values.size(); i += width) {
-        low = std::min(low, values[i]);
-        high = std::max(high, values[i]);
-      }
-      accessor.minValues.push_back(static_cast<double>(low));
-      accessor.maxValues.push_back(static_cast<double>(high));
-    }
-    return index;
-  }
-
   void add_mesh() {
     tinygltf::Primitive primitive;
     primitive.mode = TINYGLTF_MODE_TRIANGLES;
@@ -70,16 +35,16 @@ class Writer {
     // Without triangles there are only points to show.
     if (corners.empty()) primitive.mode = TINYGLTF_MODE_POINTS;
     if (!corners.empty()) {
-      primitive.indices = add(std::span<const std::uint32_t>(corners), TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
-                              TINYGLTF_TYPE_SCALAR, 1, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
+      primitive.indices = arrays_.add(std::span<const std::uint32_t>(corners), TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT,
+                                      TINYGLTF_TYPE_SCALAR, corners.size(), TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER);
     }
     const auto base = mesh_.frame(0);
-    primitive.attributes["POSITION"] = add_ranged(base, TINYGLTF_TYPE_VEC3, 3, TINYGLTF_TARGET_ARRAY_BUFFER);
+    primitive.attributes["POSITION"] = arrays_.add_ranged(base, TINYGLTF_TYPE_VEC3, 3, TINYGLTF_TARGET_ARRAY_BUFFER);
     std::vector<float> moved(base.size());
     for (int f = 1; f < mesh_.frames; ++f) {
       const auto frame = mesh_.frame(f);
       for (std::size_t i = 0; i < moved.size(); ++i) moved[i] = frame[i] - base[i];
-      primitive.targets.push_back({{"POSITION", add_ranged(moved, TINYGLTF_TYPE_VEC3, 3)}});
+      primitive.targets.push_back({{"POSITION", arrays_.add_ranged(moved, TINYGLTF_TYPE_VEC3, 3)}});
     }
     tinygltf::Mesh mesh;
     mesh.name = "mesh";
@@ -104,8 +69,8 @@ class Writer {
       if (f > 0) weights[f * (frames - 1) + f - 1] = 1;
     }
     tinygltf::AnimationSampler sampler;
-    sampler.input = add_ranged(times, TINYGLTF_TYPE_SCALAR, 1);
-    sampler.output = add(std::span<const float>(weights), TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_SCALAR, 1);
+    sampler.input = arrays_.add_ranged(times, TINYGLTF_TYPE_SCALAR, 1);
+    sampler.output = arrays_.add_floats(weights, TINYGLTF_TYPE_SCALAR, 1);
     sampler.interpolation = "LINEAR";
     tinygltf::AnimationChannel channel;
     channel.sampler = 0;
@@ -120,6 +85,7 @@ class Writer {
 
   const MeshSequence& mesh_;
   tinygltf::Model model_;
+  GltfArrays arrays_;
 };
 
 }  // namespace

@@ -5,7 +5,9 @@
 // through zigzag (0, -1, 1, -2, ... become 0, 1, 2, 3, ...), so that small ones of either sign stay short.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -67,7 +69,18 @@ inline void put_signed_varint(ByteWriter& out, std::int64_t value) {
   return static_cast<std::size_t>(count);
 }
 
-// A length as put_varint writes it, then the bytes.
+// A part within a section: its length as put_varint writes it, then its bytes.
+inline void put_part(ByteWriter& out, std::span<const std::byte> part) {
+  put_varint(out, part.size());
+  out.put_bytes(part);
+}
+
+// `what` names the bytes in the message: "bytes of a table".
+[[nodiscard]] inline std::span<const std::byte> get_part(ByteReader& in, const char* what) {
+  return in.take(get_count(in, 1, what));
+}
+
+// Likewise of characters.
 inline void put_short_string(ByteWriter& out, std::string_view text) {
   put_varint(out, text.size());
   out.put_array(std::span<const char>(text.data(), text.size()));

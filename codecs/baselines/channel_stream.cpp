@@ -8,15 +8,6 @@
 namespace kinespace {
 namespace {
 
-void put_part(ByteWriter& out, const Bytes& part) {
-  put_varint(out, part.size());
-  out.put_bytes(part);
-}
-
-std::span<const std::byte> get_part(ByteReader& in) {
-  return in.take(get_count(in, 1, "bytes of a part"));
-}
-
 constexpr int largest_shift = 48;    // of reconstruction points, in 1/64 steps
 constexpr int largest_weight = 120;  // 2^30
 
@@ -83,15 +74,15 @@ ChannelTables unpack_channel_tables(std::span<const std::byte> bytes, const Skel
                                     const std::string& source) {
   ByteReader in(bytes, source);
   ChannelTables out;
-  out.layout = unpack_layout(get_part(in), skeleton, source);
+  out.layout = unpack_layout(get_part(in, "bytes of a part"), skeleton, source);
   const int channels = out.layout.channel_count();
-  unpack_numbers(get_part(in), weighted ? channels : 0, out, source);
+  unpack_numbers(get_part(in, "bytes of a part"), weighted ? channels : 0, out, source);
   const std::uint64_t components = get_varint(in);
   if (components > static_cast<std::uint64_t>(channels)) {
     in.fail(std::to_string(components) + " components", "at most as many as channels (damaged)");
   }
-  out.coding.spectrum = unpack_spectrum(get_part(in), static_cast<int>(components), source);
-  out.coding.start = unpack_start(get_part(in), source);
+  out.coding.spectrum = unpack_spectrum(get_part(in, "bytes of a part"), static_cast<int>(components), source);
+  out.coding.start = unpack_start(get_part(in, "bytes of a part"), source);
   in.expect_end();
   return out;
 }
@@ -111,8 +102,8 @@ PieceView view_piece(std::span<const std::byte> bytes, const std::string& source
   if (index < -largest_step_index || index > largest_step_index)
     in.fail("a quantiser step out of range", "2^-32 to 2^32");
   out.step = grid_step(static_cast<int>(index));
-  out.side = get_part(in);
-  for (int layer = 0; layer < layer_count; ++layer) out.layers.push_back(get_part(in));
+  out.side = get_part(in, "bytes of a part");
+  for (int layer = 0; layer < layer_count; ++layer) out.layers.push_back(get_part(in, "bytes of a part"));
   in.expect_end();
   return out;
 }

@@ -41,15 +41,14 @@ Bytes pack_side(const PcaSide& side) {
   for (const std::int64_t m : side.mean) numbers.put(m, 1);
   const Bytes means = std::move(numbers).finish();
   ByteWriter out;
-  put_varint(out, means.size());
-  out.put_bytes(means);
+  put_part(out, means);
   out.put_bytes(pack_basis(side.basis));
   return std::move(out).take();
 }
 
 PcaSide unpack_side(std::span<const std::byte> bytes, int channels, const std::string& source) {
   ByteReader in(bytes, source);
-  IntegerReader numbers(in.take(get_count(in, 1, "bytes of means")), source);
+  IntegerReader numbers(get_part(in, "bytes of means"), source);
   PcaSide out;
   out.components = static_cast<int>(numbers.get_between(0, channels));
   for (int c = 0; c < channels; ++c) out.mean.push_back(numbers.get_between(-(1LL << 37), 1LL << 37, 1));

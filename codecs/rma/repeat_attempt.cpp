@@ -184,8 +184,7 @@ RepeatAttempt RepeatEncoder::attempt(double step, bool predict) const {
     ByteWriter out;
     for (const auto& layers : group) {
       for (const Bytes& layer : layers) {
-        put_varint(out, layer.size());
-        out.put_bytes(layer);
+        put_part(out, layer);
       }
     }
     coding.attempt.groups.push_back(std::move(out).take());

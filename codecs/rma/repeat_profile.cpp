@@ -87,7 +87,7 @@ class RepeatReader final : public MarkerReader {
         out->places[part.windows[i] - layout_->plain.groups[g].first] = {part.offsets[i], end - part.offsets[i]};
       }
       std::vector<std::span<const std::byte>> layers;
-      for (int layer = 0; layer < layer_count; ++layer) layers.push_back(in.take(get_count(in, 1, "bytes of a layer")));
+      for (int layer = 0; layer < layer_count; ++layer) layers.push_back(get_part(in, "bytes of a layer"));
       decode_group(blocks, is_predicted ? tables_.predicted : tables_.tables.coding, layers, stream().source());
     }
     in.expect_end();

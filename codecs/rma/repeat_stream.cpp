@@ -31,12 +31,9 @@ Bytes pack_repeats(const RepeatTables& tables, const ClipTable& clips) {
   const Bytes numbers = std::move(out).finish();
   const bool any = std::ranges::any_of(tables.predictions, &WindowPrediction::used);
   ByteWriter all;
-  put_varint(all, numbers.size());
-  all.put_bytes(numbers);
+  put_part(all, numbers);
   if (!any) return std::move(all).take();
-  const Bytes spectrum = pack_spectrum(tables.predicted.spectrum);
-  put_varint(all, spectrum.size());
-  all.put_bytes(spectrum);
+  put_part(all, pack_spectrum(tables.predicted.spectrum));
   all.put_bytes(pack_start(tables.predicted.start));
   return std::move(all).take();
 }
@@ -44,7 +41,7 @@ Bytes pack_repeats(const RepeatTables& tables, const ClipTable& clips) {
 void unpack_repeats(std::span<const std::byte> bytes, const ClipTable& clips, std::int64_t numbers,
                     const std::string& source, RepeatTables& out) {
   ByteReader all(bytes, source);
-  ValueReader in(all.take(get_count(all, 1, "bytes of repeats")), context_count, source);
+  ValueReader in(get_part(all, "bytes of repeats"), context_count, source);
   out.predictions = get_predictions(in, clips, prediction_context);
   for (std::size_t w = 0; w < out.predictions.size(); ++w) out.jumps.push_back(in.get_bit(jump_context));
   for (const ClipEntry& clip : clips.clips) {
@@ -59,7 +56,7 @@ void unpack_repeats(std::span<const std::byte> bytes, const ClipTable& clips, st
   const int components = out.tables.basis.components;
   out.predicted.spectrum = out.tables.coding.spectrum;
   if (std::ranges::any_of(out.predictions, &WindowPrediction::used)) {
-    const auto spectrum = all.take(get_count(all, 1, "bytes of a spectrum"));
+    const auto spectrum = get_part(all, "bytes of a spectrum");
     out.predicted.spectrum = unpack_spectrum(spectrum, components, source);
     out.predicted.start = unpack_start(all.take(all.remaining()), source);
   }
