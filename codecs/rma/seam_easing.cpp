@@ -153,9 +153,10 @@ class SeamWindow {
   Eigen::MatrixXd values_;  // a column for each frame
 };
 
-void ease(Clip& clip, int seam, double limit_cm_s, int lower, int upper) {
+// `most`: frames of reach.
+void ease(Clip& clip, int seam, double limit_cm_s, int most, int lower, int upper) {
   for (const double reach_s : reaches_s) {
-    const int reach = std::max(3, static_cast<int>(std::min(reach_s * clip.rate_hz, 1e4)));
+    const int reach = std::max(3, static_cast<int>(std::min<double>(reach_s * clip.rate_hz, most)));
     const SeamWindow window(clip, seam, reach, lower, upper);
     for (const double stiffness : stiffnesses) {
       window.write_smoothed(stiffness, clip);
@@ -215,10 +216,16 @@ double speed_change_at_seam(const Clip& clip, int seam) {
 
 void ease_seams(Clip& clip, std::span<const int> seams, double limit_cm_s, std::span<const int> breaks) {
   if (!(limit_cm_s > 0)) return;
-  for (const int seam : seams) {
+  for (std::size_t s = 0; s < seams.size(); ++s) {
+    const int seam = seams[s];
     if (speed_change_at_seam(clip, seam) <= limit_cm_s) continue;
+    // Twice the way to the seams around it, so that many seams take no longer than many frames.
+    const int before = s > 0 ? seams[s - 1] : 0;
+    const int after = s + 1 < seams.size() ? seams[s + 1] : clip.frames;
+    const int most = 2 * std::max(seam - before, after - seam);
     const auto next = std::ranges::upper_bound(breaks, seam);
-    ease(clip, seam, limit_cm_s, next == breaks.begin() ? 0 : *(next - 1), next == breaks.end() ? clip.frames : *next);
+    ease(clip, seam, limit_cm_s, most, next == breaks.begin() ? 0 : *(next - 1),
+         next == breaks.end() ? clip.frames : *next);
   }
 }
 

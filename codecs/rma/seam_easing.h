@@ -6,9 +6,10 @@
 //
 //   x' = argmin  sum_f u_f^2 (x'_f - x_f)^2 + lambda sum_f (x'_{f-1} - 2 x'_f + x'_{f+1})^2
 //
-// with u_f the distance to the seam over the reach. Reach (0.1 s, then 0.2, 0.4 s) and lambda (1 to 4096) are the first
-// that keep to the limit. The limit is such that jerks of its size are seen elsewhere in the same motion, too.
-// Products, sums and square roots in a fixed order: the same bits on every machine.
+// with u_f the distance to the seam over the reach. Reach (0.1 s, then 0.2, 0.4 s; at most twice the way to the seams
+// around) and lambda (1 to 4096) are the first that keep to the limit. The limit is such that jerks of its size are
+// seen elsewhere in the same motion, too. Products, sums and square roots in a fixed order: the same bits on every
+// machine.
 #pragma once
 
 #include <array>
