@@ -186,7 +186,10 @@ Bytes encode_trajectory_pca(const MeshSequence& mesh, const MeshCodecOptions& op
     spread += (x.rowwise() - x.colwise().mean()).squaredNorm();
   }
   const double numbers = 3.0 * mesh.vertices * mesh.frames;
-  const double least = std::max(diagonal(mesh) * 1e-9, 1e-20);
+  // Positions are floats: finer steps than those of the largest one would only make weights that no integer holds.
+  double largest = 0;
+  for (const float x : mesh.positions) largest = std::max(largest, std::abs(double{x}));
+  const double least = std::max(largest * 1e-9, 1e-20);
   const auto tail_at = [&](double kg) { return 0.5 * kg * kg * 1e-4 * spread; };
   if (options.bytes) {
     // The tail goes with the step: an error of about 0.3 steps a number.
