@@ -66,7 +66,9 @@ MeshSequence read_any(const fs::path& path, const std::optional<fs::path>& libra
   return OpenStream(file.bytes(), path, library, session)->decode_all();
 }
 
-double number_of(const Bitstream& stream, const char* key) {
+// Null where the stream has none: a measure that its sequence leaves open.
+Json number_of(const Bitstream& stream, const char* key) {
+  if (stream.find_option(key) == nullptr) return nullptr;
   return stream.number_option(key, 0, std::numeric_limits<double>::max());
 }
 

@@ -48,7 +48,9 @@ double spread_about_centroids(const MeshSequence& mesh) {
 
 double spread_about_means_over_time(const MeshSequence& mesh) {
   Points mean = Points::Zero(mesh.vertices, 3);
-  for (int f = 0; f < mesh.frames; ++f) mean += frame_points(mesh, f) / mesh.frames;
+  // Divided at the end: then equal frames have themselves for a mean, to the last bit, and their spread is none.
+  for (int f = 0; f < mesh.frames; ++f) mean += frame_points(mesh, f);
+  mean /= mesh.frames;
   double sum = 0;
   for (int f = 0; f < mesh.frames; ++f) sum += (frame_points(mesh, f) - mean).squaredNorm();
   return sum;

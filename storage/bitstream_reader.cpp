@@ -4,6 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "base/error.h"
 #include "base/file.h"
 #include "storage/bitstream.h"
@@ -198,8 +200,7 @@ double Bitstream::number_option(std::string_view key, double least, double most)
   double value = 0;
   // Written so that NaN is refused too.
   if (!parse_number(text, value) || !(value >= least && value <= most)) {
-    fail("option " + in_quotes(key) + " = " + in_quotes(text),
-         "a number from " + std::to_string(least) + " to " + std::to_string(most));
+    fail("option " + in_quotes(key) + " = " + in_quotes(text), fmt::format("a number from {} to {}", least, most));
   }
   return value;
 }

@@ -14,9 +14,12 @@ MeshError measured(const MeshSequence& mesh, const std::function<Points(int)>& f
 }
 
 void set_measured(BitstreamWriter& out, const MeshError& error, std::int64_t connectivity) {
-  out.set_option("kg", fmt::format("{:.5g}", error.kg));
-  out.set_option("kg_time", fmt::format("{:.5g}", error.kg_time));
-  out.set_option("lr", fmt::format("{:.5g}", error.lr));
+  const auto set = [&out](const char* key, double value) {
+    if (std::isfinite(value)) out.set_option(key, fmt::format("{:.5g}", value));
+  };
+  set("kg", error.kg);
+  set("kg_time", error.kg_time);
+  set("lr", error.lr);
   out.set_option("connectivity", connectivity);
 }
 

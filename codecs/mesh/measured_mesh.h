@@ -12,7 +12,7 @@ namespace kinespace {
 // The error of frames that a decoder gives; `rigidity`: with lr, which takes longer.
 [[nodiscard]] MeshError measured(const MeshSequence& mesh, const std::function<Points(int)>& frame, bool rigidity);
 
-// Options kg, kg_time, lr and connectivity (bytes).
+// Options kg, kg_time, lr (each only where it is a number: nothing moves in a single frame) and connectivity (bytes).
 void set_measured(BitstreamWriter& out, const MeshError& error, std::int64_t connectivity);
 
 }  // namespace kinespace

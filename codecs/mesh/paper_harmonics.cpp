@@ -28,7 +28,7 @@
 namespace kinespace {
 namespace {
 
-constexpr double usual_kg = 1;
+constexpr double usual_kg = 0.5;
 constexpr double key_steps = 0.5;  // step of the key-frames over the root mean square error a coordinate
 
 // A key-frame and what follows from it.
@@ -382,7 +382,8 @@ Bytes encode_paper_harmonics(const MeshSequence& mesh, const MeshCodecOptions& o
   const double spread = std::max(spread_of(mesh), least);
   const double kg = options.kg.value_or(usual_kg);
   const double rms = kg / 100 * spread / std::sqrt(3.0 * mesh.vertices * mesh.frames);
-  const bool driven = !options.kg && !options.bytes;  // by bases and clusters
+  // By bases and clusters, when these are all that is asked for.
+  const bool driven = !options.kg && !options.bytes && (options.bases > 0 || options.clusters > 0);
   double reached = 0;
   for (const auto& [functions, clusters] : choices(mesh, options)) {
     const Encoder encoder(mesh, functions, clusters, std::max(key_steps * rms, least), options.progress);
@@ -398,8 +399,8 @@ Bytes encode_paper_harmonics(const MeshSequence& mesh, const MeshCodecOptions& o
       throw Error(ErrorKind::usage, {.found = fmt::format("{} bytes for the stream", *options.bytes),
                                      .expected = "more for this sequence"});
     }
-    // Without a target: a twentieth more than exact coefficients would give.
-    double target = driven ? 1.05 * floor : kg;
+    // Without a target: a twentieth more than exact coefficients would give, where that is not next to nothing.
+    double target = driven ? std::max(1.05 * floor, 0.1 * usual_kg) : kg;
     reached = floor;
     for (int round = 0; round < 3 && (driven || floor < target); ++round) {
       const double step = largest_step(std::max(6 * rms, least), least, target, 0.01, 12, [&](double at) {

@@ -57,6 +57,16 @@ TEST_F(MeshCommand, a_sequence_goes_there_and_back_within_the_error_asked_for) {
   EXPECT_EQ(run({"decode", at("tube.ksm"), "-o", at("part"), "--from", "3", "--to", "5"})["frames"], 3);
 }
 
+TEST_F(MeshCommand, a_single_frame_has_no_error_over_time) {
+  write_mesh_sequence(at("still"), bending_tube(60, 1, 1.0));
+  for (const char* codec : {"mesh-harmonics", "mesh-pca", "mesh-draco"}) {
+    const json encoded = run({"encode", at("still"), "-o", at("still.ksm"), "--codec", codec});
+    EXPECT_TRUE(encoded["kg_time"].is_null()) << codec;
+    EXPECT_LE(encoded["kg"], 0.5) << codec;
+    EXPECT_EQ(run({"info", at("still.ksm")})["frames"], 1);
+  }
+}
+
 TEST_F(MeshCommand, info_describes_sequences_and_streams) {
   const json sequence = run({"info", at("tube")});
   EXPECT_EQ(sequence["kind"], "mesh");

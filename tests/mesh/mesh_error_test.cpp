@@ -44,6 +44,15 @@ TEST(MeshError, kg_time_is_relative_to_the_motion) {
   EXPECT_TRUE(std::isnan(compare_positions(still, a).kg_time)) << "a still reference has no motion to compare with";
 }
 
+TEST(MeshError, frames_that_are_all_alike_do_not_move_at_all) {
+  MeshSequence still = sheet(5, 4, 10);
+  for (int f = 1; f < still.frames; ++f) set_frame(still, f, 1.0 / 3 * frame_points(still, 0));
+  set_frame(still, 0, frame_points(still, 1));
+  MeshSequence off = still;
+  set_frame(off, 4, frame_points(still, 4) * 1.001);
+  EXPECT_TRUE(std::isnan(compare_positions(still, off).kg_time));
+}
+
 TEST(MeshError, local_rigidity_is_zero_under_rigid_motion) {
   const MeshSequence mesh = bending_tube(800, 4, 1.5);
   EXPECT_LT(compare(mesh, moved_rigidly(mesh, 0.7)).lr, 1e-7);
