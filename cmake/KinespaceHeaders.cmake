@@ -1,9 +1,10 @@
-# The target kinespace_headers compiles every header alone, without precompiled headers: each must include what it uses.
+# The target kinespace_headers compiles every header alone, those of nested folders too, without precompiled headers:
+# each must include what it uses.
 add_custom_target(kinespace_headers)
 
 function(kinespace_check_headers target)
   get_target_property(folder ${target} SOURCE_DIR)
-  file(GLOB headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${folder}/*.h)
+  file(GLOB_RECURSE headers CONFIGURE_DEPENDS RELATIVE ${PROJECT_SOURCE_DIR} ${folder}/*.h)
   if(NOT headers)
     return()
   endif()
