@@ -78,6 +78,32 @@ TEST_F(MeshCommand, info_describes_sequences_and_streams) {
   EXPECT_EQ(stream["vertices"], sequence["vertices"]);
 }
 
+// For every codec, since the files are read before any of them begins.
+TEST_F(MeshCommand, a_frame_with_other_counts_or_another_order_is_named_and_nothing_is_written) {
+  const MeshSequence mesh = bending_tube(100, 3, 1.0);
+  const auto with_second_frame = [&](const char* name, const MeshSequence& other) {
+    write_mesh_sequence(at(name), mesh, MeshFormat::obj);
+    write_mesh_sequence(at("one_other"), other, MeshFormat::obj);
+    std::filesystem::copy_file(at("one_other") + "/frame_00001.obj", at(name) + "/frame_00002.obj",
+                               std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::remove_all(at("one_other"));
+  };
+  with_second_frame("more_vertices", bending_tube(140, 1, 1.0));
+  MeshSequence fewer = mesh, swapped = mesh;
+  fewer.triangles.pop_back();
+  std::swap(swapped.triangles[2], swapped.triangles[3]);
+  with_second_frame("fewer_triangles", fewer);
+  with_second_frame("another_order", swapped);
+  for (const char* name : {"more_vertices", "fewer_triangles", "another_order"}) {
+    for (const char* codec : {"mesh-harmonics", "mesh-pca", "mesh-draco"}) {
+      const std::string message = fails({"encode", at(name), "-o", at("odd.ksm"), "--codec", codec}, 1);
+      EXPECT_NE(message.find("frame_00002.obj"), std::string::npos) << message;
+      EXPECT_NE(message.find("frame 1"), std::string::npos) << message;
+      EXPECT_FALSE(std::filesystem::exists(at("odd.ksm")));
+    }
+  }
+}
+
 TEST_F(MeshCommand, functions_kept_in_a_library_change_nothing_but_the_time) {
   run({"encode", at("tube"), "-o", at("kept.ksm"), "--library", at("meshes.kspace")});
   const json plain = run({"decode", at("kept.ksm"), "-o", at("plain")});
