@@ -114,7 +114,8 @@ void BasisCache::keep(const Wanted& wanted, const SmoothBasis& basis) {
     Library library = std::filesystem::exists(library_) ? Library::open(library_) : Library::create(library_);
     library.put_artifact(artifact_kind, wanted.key, pack_mesh_basis(basis));
   } catch (const Error& error) {
-    if (error.kind() != ErrorKind::machine) throw;  // read-only, full or in use: the work goes on without
+    if (error.kind() == ErrorKind::bad_input) throw;
+    // Read-only, full, in use or just made by another process: the work goes on without.
     warn_(fmt::format("the basis cannot be kept: {}", error.what()));
   }
 }
