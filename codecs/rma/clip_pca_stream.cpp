@@ -70,7 +70,7 @@ Bytes pack_clip_pca(const ClipPcaStream& stream) {
   put_reference_pose(out, stream.reference, pose);
   out.put(static_cast<std::int64_t>(stream.groups.size()), header);
   for (const ClipPcaGroup& group : stream.groups) {
-    const std::size_t quarter = group.mean.size() / 4;
+    const std::size_t quarter = std::max<std::size_t>(1, group.mean.size() / 4);
     // Control points of a coordinate lie near each other.
     for (std::size_t i = 0; i < group.mean.size(); ++i) {
       const std::int64_t near = i >= quarter ? group.mean[i - quarter] : 0;
@@ -99,7 +99,7 @@ namespace {
 
 ClipPcaGroup get_group(ValueReader& in, std::size_t size, std::int64_t& numbers) {
   ClipPcaGroup out;
-  const std::size_t quarter = size / 4;
+  const std::size_t quarter = std::max<std::size_t>(1, size / 4);
   numbers -= static_cast<std::int64_t>(size);
   if (numbers < 0) in.damaged();
   for (std::size_t i = 0; i < size; ++i) {

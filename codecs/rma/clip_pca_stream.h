@@ -58,7 +58,7 @@ class ClipPcaDecoder {
   [[nodiscard]] Clip decode(std::size_t clip) const;
 
  private:
-  [[nodiscard]] std::vector<double> control_points(std::size_t piece) const;
+  [[nodiscard]] std::vector<double> control_points(std::size_t number) const;
 
   const ClipTable& table_;
   const ClipPcaStream& stream_;

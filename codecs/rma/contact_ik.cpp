@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <ranges>
 
 #include "codecs/rma/root_alignment.h"
 
@@ -171,10 +172,6 @@ std::vector<Limb> limbs_of(const Clip& clip, std::span<const ContactTrack> track
   return out;
 }
 
-}  // namespace
-
-namespace {
-
 // The joints of a limb's path that turn, from its end upwards: at most so many, none above joint `below`.
 void choose_turning(const Clip& clip, const Limb& limb, std::size_t most, int below, std::vector<std::size_t>& out) {
   const int root = clip.skeleton.travel_root();
@@ -202,9 +199,9 @@ void hold_contacts(Clip& clip, std::span<const ContactTrack> tracks, double blen
   Solver solver;
   std::vector<std::size_t> turning;
   // Children first (a toe takes the leg along), then their parents (an ankle has its own place) ...
-  for (auto limb = limbs.rbegin(); limb != limbs.rend(); ++limb) {
-    choose_turning(clip, *limb, limb->most_turning, 0, turning);
-    hold_limb(clip, *limb, turning, solver);
+  for (const Limb& limb : std::views::reverse(limbs)) {
+    choose_turning(clip, limb, limb.most_turning, 0, turning);
+    hold_limb(clip, limb, turning, solver);
   }
   // ... and what that took from the children, by turning about the nearest such parent.
   for (const Limb& limb : limbs) {

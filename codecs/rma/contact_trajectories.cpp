@@ -174,14 +174,14 @@ std::vector<ContactTrack> contact_tracks(std::span<const ContactCode> codes, con
     sums.push_back(moved);
     for (const auto& move : code.moves) {
       moved += ContactCode::move_step_cm * Eigen::Vector3d(move[0], move[1], move[2]);
-      sums.push_back(sums.back() + moved);
+      sums.emplace_back(sums.back() + moved);
     }
     const auto frames = static_cast<std::ptrdiff_t>(code.frames());
     for (std::ptrdiff_t f = 0; f < frames; ++f) {
       const std::ptrdiff_t near = std::min({reach, f, frames - 1 - f});
       const auto first = static_cast<std::size_t>(f - near);
       const auto last = static_cast<std::size_t>(f + near + 1);
-      track.points.push_back(at + (sums[last] - sums[first]) / static_cast<double>(last - first));
+      track.points.emplace_back(at + (sums[last] - sums[first]) / static_cast<double>(last - first));
     }
     out.push_back(std::move(track));
   }

@@ -37,8 +37,8 @@ struct SegmentGrouping {
   std::vector<int> group;           // of each segment; groups are numbered in the order of their first segments
   int groups = 0;
 
-  // The frames of one group: neighbouring segments of the same clip are joined.
-  [[nodiscard]] std::vector<FrameSpan> ranges(int group, const FrameTable& table) const;
+  // The frames of group `wanted`: neighbouring segments of the same clip are joined.
+  [[nodiscard]] std::vector<FrameSpan> ranges(int wanted, const FrameTable& table) const;
 };
 
 // Groups the segments (in time, covering the table).

@@ -51,6 +51,7 @@ Clip clip_from_markers(const ClipEntry& entry, const Skeleton& skeleton, const M
   std::vector<double> values(d + (with_joints ? 3 * joints.size() : 0));
   std::vector<Eigen::Quaterniond> rotations(joints.size());
   std::vector<double*> tracks;
+  tracks.reserve(joints.size());
   for (const int j : joints) tracks.push_back(out.rotation_track(j).data());
   const auto curves = static_cast<std::size_t>(RootAlignment::curve_count(alignment.degrees));
   std::array<double, 7> at{};

@@ -49,7 +49,7 @@ Eigen::Vector3d farthest(std::span<const Eigen::Vector3d> points) {
 }
 
 Eigen::Vector3d choose_along(const RigidPoints& points) {
-  const Eigen::Vector3d joint = farthest(points.joints);
+  Eigen::Vector3d joint = farthest(points.joints);
   if (joint.norm() >= short_bone_cm) return joint;
   Eigen::Vector3d direction = joint.norm() > 1e-3 ? joint : farthest(points.ends);
   if (direction.norm() < 1e-3) direction = Eigen::Vector3d::UnitY();
@@ -101,7 +101,7 @@ MarkerRig::MarkerRig(const Skeleton& skeleton) {
       from_owner[j] = place;
     }
     if (owner[j] >= 0 && joint.end_site) {
-      points[static_cast<std::size_t>(owner[j])].ends.push_back(from_owner[j] + *joint.end_site);
+      points[static_cast<std::size_t>(owner[j])].ends.emplace_back(from_owner[j] + *joint.end_site);
     }
   }
   for (std::size_t b = 0; b < bones_.size(); ++b) {
