@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -24,30 +25,6 @@ double l1_distance(const double* a, const double* b, std::ptrdiff_t count) {
   for (const double part : sum) all += part;
   for (; i < count; ++i) all += std::abs(a[i] - b[i]);
   return all;
-}
-
-Eigen::MatrixXd distances_of(const MeshSequence& mesh) {
-  // Frames in tiles, so that a sequence larger than memory's speed is not read once for every pair.
-  constexpr int tile = 16;
-  const Points reference = frame_points(mesh, 0);
-  const auto aligned = [&](int f) {
-    const Points x = frame_points(mesh, f);
-    return f == 0 ? x : rigid_motion(reference, x).undo(x);
-  };
-  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(mesh.frames, mesh.frames);
-  std::vector<Points> rows;
-  for (int first = 0; first < mesh.frames; first += tile) {
-    rows.clear();
-    for (int f = first; f < std::min(first + tile, mesh.frames); ++f) rows.push_back(aligned(f));
-    for (int g = first + 1; g < mesh.frames; ++g) {
-      const Points other = aligned(g);
-      for (int f = first; f < std::min(first + static_cast<int>(rows.size()), g); ++f) {
-        const Points& row = rows[static_cast<std::size_t>(f - first)];
-        out(f, g) = out(g, f) = l1_distance(row.data(), other.data(), other.size());
-      }
-    }
-  }
-  return out;
 }
 
 // A generator whose numbers the standard does not leave open (steele 2014, splitmix64).
@@ -173,9 +150,31 @@ Clusters cluster(const Eigen::MatrixXd& distances, const ClusterOptions& options
   return best;
 }
 
+Eigen::MatrixXd frame_distances(const MeshSequence& mesh) {
+  // Frames in tiles, so that a sequence larger than memory's speed is not read once for every pair.
+  constexpr int tile = 16;
+  const std::vector<RigidMotion> motions = rigid_motions(mesh, 0);
+  const auto aligned = [&](int f) { return motions[static_cast<std::size_t>(f)].undo(frame_points(mesh, f)); };
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(mesh.frames, mesh.frames);
+  std::vector<Points> rows;
+  for (int first = 0; first < mesh.frames; first += tile) {
+    const int end = std::min(first + tile, mesh.frames);
+    rows.clear();
+    for (int f = first; f < end; ++f) rows.push_back(aligned(f));
+    for (int g = first + 1; g < mesh.frames; ++g) {
+      const Points other = aligned(g);
+      for (int f = first; f < std::min(end, g); ++f) {
+        const Points& row = rows[static_cast<std::size_t>(f - first)];
+        out(f, g) = out(g, f) = l1_distance(row.data(), other.data(), other.size());
+      }
+    }
+  }
+  return out;
+}
+
 Clusters cluster_frames(const MeshSequence& mesh, const ClusterOptions& options) {
   options.validate(mesh.frames);
-  return cluster(distances_of(mesh), options);
+  return cluster(frame_distances(mesh), options);
 }
 
 }  // namespace kinespace

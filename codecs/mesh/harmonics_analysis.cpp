@@ -58,7 +58,9 @@ void HarmonicsAnalysis::pack_key() {
   connectivity_ = connectivity_size(mesh);
   const Points decoded = setup_.grid.points(mesh.keys[0]);
   if (!decimation_) {
-    space_ = std::make_shared<HarmonicsSpace>(decoded, mesh.triangles, settings_.functions);
+    space_ = settings_.eigenvectors
+                 ? HarmonicsSpace::of_eigenvectors(decoded, mesh.triangles, settings_.functions)
+                 : std::make_shared<const HarmonicsSpace>(decoded, mesh.triangles, settings_.functions);
     return;
   }
   setup_.coarse_vertices = static_cast<int>(decimation_->kept.size());
@@ -111,12 +113,6 @@ void HarmonicsAnalysis::find_residuals() {
   }
 }
 
-double HarmonicsAnalysis::residual_energy() const {
-  double sum = 0;
-  for (const BlockTables& block : blocks_) sum += block.detail->energy();
-  return sum;
-}
-
 HarmonicsAnalysis::Attempt HarmonicsAnalysis::code(double step, bool exact, HarmonicsFrames* frames) const {
   progress_.check_stop();
   Attempt out;
@@ -128,7 +124,7 @@ HarmonicsAnalysis::Attempt HarmonicsAnalysis::code(double step, bool exact, Harm
     if (exact) {
       const Eigen::MatrixXd table =
           residual_table(b, [&](int at) { return coefficients_of(space_->key_coefficients(), motion.part, at); });
-      detail = PartCoder(table, space_->vertex_graph()).code(options);
+      detail = block.detail->code(options, table);
     } else {
       detail = block.detail->code(options);
     }
@@ -141,13 +137,17 @@ HarmonicsAnalysis::Attempt HarmonicsAnalysis::code(double step, bool exact, Harm
   return out;
 }
 
-HarmonicsAnalysis::Result HarmonicsAnalysis::encode(double step, bool rigidity) const {
+HarmonicsAnalysis::Trial HarmonicsAnalysis::encode(double step) const {
   HarmonicsFrames frames(space_, refinement_, settings_.rotate);
   frames.track = track_;
-  const Attempt attempt = code(step, true, &frames);
-  const MeshError error = measured(
-      mesh_, [&](int f) { return frames.frame(f); }, rigidity);
-  return {.stream = stream_of(attempt, error), .error = error};
+  Trial out{.attempt = code(step, true, &frames), .decoded = mesh_, .kg = 0};
+  tbb::parallel_for(0, mesh_.frames, [&](int f) { set_frame(out.decoded, f, frames.frame(f)); });
+  out.kg = compare_positions(mesh_, out.decoded).kg;
+  return out;
+}
+
+Bytes HarmonicsAnalysis::finish(const Trial& trial) const {
+  return stream_of(trial.attempt, compare(mesh_, trial.decoded));
 }
 
 std::int64_t HarmonicsAnalysis::fixed_bytes() const {

@@ -14,12 +14,16 @@
 
 namespace kinespace {
 
+// Step of the key-frame's grid over the root mean square error a coordinate that is asked for.
+inline constexpr double harmonics_key_steps = 2.2;
+
 struct HarmonicsSettings {
   int key = 0;          // the key-frame
   int functions = 0;    // K
   double key_step = 1;  // grid of the key-frame, in the mesh's unit
   bool rotate = true;   // details turn with the surface
   FrameTransform transform = FrameTransform::components;
+  bool eigenvectors = false;  // for estimates only: streams of them are not made
 };
 
 class HarmonicsAnalysis {
@@ -37,19 +41,20 @@ class HarmonicsAnalysis {
   // Quick: residuals as if the coefficients were not rounded, which changes little; the figures are close, no more.
   [[nodiscard]] Attempt estimate(double step) const { return code(step, false, nullptr); }
 
-  struct Result {
-    Bytes stream;
-    MeshError error;
+  // All that a stream holds but what it says about itself, and what it decodes to.
+  struct Trial {
+    Attempt attempt;
+    MeshSequence decoded;
+    double kg = 0;
   };
-  // The stream and its measured error, `rigidity`: with lr.
-  [[nodiscard]] Result encode(double step, bool rigidity) const;
+  [[nodiscard]] Trial encode(double step) const;
+  // The stream of a trial, with its whole measured error: lr takes as long as coding.
+  [[nodiscard]] Bytes finish(const Trial& trial) const;
 
   void set_transform(FrameTransform transform) { settings_.transform = transform; }
   [[nodiscard]] double coded_vertices() const { return coded().vertices; }
   // Of the parts that do not depend on the step.
   [[nodiscard]] std::int64_t fixed_bytes() const;
-  // Squared sum of what is left when nothing but the key-frame and its motion is coded.
-  [[nodiscard]] double residual_energy() const;
 
  private:
   struct BlockTables {

@@ -4,6 +4,7 @@
 // since residuals mend what matters. 400 functions serve all: fewer leave more to the residuals, more cost time.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 
@@ -19,8 +20,7 @@ namespace {
 
 constexpr double usual_kg = 0.5;
 constexpr int usual_functions = 400;
-constexpr double key_steps = 2.2;  // step of the key-frame over the root mean square error a coordinate
-constexpr double first_step = 6;   // the same of coefficients, where the search begins
+constexpr double first_step = 6;  // of coefficients, over the root mean square error: where the search begins
 
 double rms_spread(const MeshSequence& mesh) {
   double sum = 0;
@@ -50,17 +50,14 @@ class Search {
         100 / (std::max(spread_, smallest()) * std::sqrt(3.0 * analysis_->coded_vertices() * mesh_.frames));
     settle_transform(kg / scale);
     const auto estimated = [&](double step) { return scale * std::sqrt(analysis_->estimate(step).squared_error); };
-    double step = largest_step(first_step * rms(kg), smallest(), kg, 0.02, 10, estimated);
-    if (step == 0) step = smallest();
-    const double found =
-        largest_step(step, smallest(), kg, 0.015, 6, [&](double at) { return analysis_->encode(at, false).error.kg; });
-    if (found == 0 && spread_ > 0) {
-      const double reached = analysis_->encode(smallest(), false).error.kg;
-      throw Error(ErrorKind::usage, {.found = fmt::format("a kg of {} percent", kg),
-                                     .expected = fmt::format("{:.4g} or more for this sequence", reached),
-                                     .remedy = decimation_ ? "ask for more coarse vertices, or none" : ""});
-    }
-    return analysis_->encode(found > 0 ? found : step, true).stream;
+    const double step = largest_step(first_step * rms(kg), smallest(), kg, 0.02, 10, estimated);
+    const auto trial = closest(kg, std::max(step, smallest()));
+    if (trial) return analysis_->finish(*trial);
+    if (spread_ == 0) return analysis_->finish(analysis_->encode(smallest()));
+    throw Error(ErrorKind::usage,
+                {.found = fmt::format("a kg of {} percent", kg),
+                 .expected = fmt::format("{:.4g} or more for this sequence", analysis_->encode(smallest()).kg),
+                 .remedy = decimation_ ? "ask for more coarse vertices, or none" : ""});
   }
 
   [[nodiscard]] Bytes for_bytes(std::int64_t bytes) {
@@ -74,17 +71,18 @@ class Search {
           return static_cast<double>(analysis_->estimate(1 / fineness).bytes);
         };
         const double fineness = largest_step(1 / (first_step * rms(kg)), 1e-30, room, 0.02, 10, inverse);
-        auto result = analysis_->encode(fineness > 0 ? 1 / fineness : 1e3 * rms(50), true);
-        const bool fits = static_cast<std::int64_t>(result.stream.size()) <= bytes;
-        if (!fits && fineness > 0) {
-          result = analysis_->encode(1.06 / fineness, true);
+        auto trial = analysis_->encode(fineness > 0 ? 1 / fineness : 1e3 * rms(50));
+        Bytes stream = analysis_->finish(trial);
+        if (static_cast<std::int64_t>(stream.size()) > bytes && fineness > 0) {
+          trial = analysis_->encode(1.06 / fineness);
+          stream = analysis_->finish(trial);
         }
-        if (static_cast<std::int64_t>(result.stream.size()) <= bytes && (best.empty() || result.error.kg < best_kg_)) {
-          best_kg_ = result.error.kg;
-          best = result.stream;
+        if (smallest_stream.empty() || stream.size() < smallest_stream.size()) smallest_stream = stream;
+        const double next = std::clamp(trial.kg, 0.001, 50.0);
+        if (static_cast<std::int64_t>(stream.size()) <= bytes && (best.empty() || trial.kg < best_kg_)) {
+          best_kg_ = trial.kg;
+          best = std::move(stream);
         }
-        if (smallest_stream.empty() || result.stream.size() < smallest_stream.size()) smallest_stream = result.stream;
-        const double next = std::clamp(result.error.kg, 0.001, 50.0);
         if (!best.empty() && std::abs(std::log(next / kg)) < 0.2) break;
         kg = next;
       } else {
@@ -106,8 +104,39 @@ class Search {
   [[nodiscard]] double smallest() const { return std::max(diagonal(mesh_) * 1e-8, 1e-20); }
   [[nodiscard]] double rms(double kg) const { return std::max(kg / 100 * spread_, smallest()); }
   void analyse(double kg) {
-    settings_.key_step = std::max(key_steps * rms(kg), smallest());
+    settings_.key_step = std::max(harmonics_key_steps * rms(kg), smallest());
     analysis_.emplace(mesh_, decimation_, settings_, options_.progress);
+  }
+  // The trial that comes closest to the target from below, begun at a step that nearly does; none when no step does.
+  [[nodiscard]] std::optional<HarmonicsAnalysis::Trial> closest(double kg, double step) const {
+    constexpr int most_trials = 12;
+    constexpr double closeness = 0.015, aim = 0.993;
+    std::optional<HarmonicsAnalysis::Trial> best;
+    double bad = std::numeric_limits<double>::infinity(), bad_error = bad;
+    for (int i = 0; i < most_trials; ++i) {
+      auto trial = analysis_->encode(step);
+      const double found = trial.kg;
+      if (found <= kg) {
+        const bool nothing_moves = best && found <= best->kg * 1.002;  // nor is anything coded
+        if (!best || trial.attempt.step > best->attempt.step) best = std::move(trial);
+        if (nothing_moves || found >= kg * (1 - closeness)) break;
+      } else {
+        if (step <= smallest()) break;
+        bad = step;
+        // Steps at which nothing is coded differ in nothing.
+        if (!best && found >= bad_error * 0.998) step *= 0.3;
+        bad_error = found;
+      }
+      // The error goes about with the step to the power of 0.9.
+      double next = step * std::pow(std::clamp(aim * kg / std::max(found, 1e-300), 0.02, 50.0), 1.1);
+      if (best && std::isfinite(bad)) {
+        const double good = best->attempt.step;
+        if (bad < good * (1 + closeness / 4)) break;
+        if (next <= good || next >= bad) next = std::sqrt(good * bad);
+      }
+      step = std::max(next, smallest());
+    }
+    return best;
   }
   // Components over time, or cosines where these cost less (cloth).
   void settle_transform(double error) {

@@ -8,6 +8,7 @@
 #include "codecs/mesh/basis_cache.h"
 #include "codecs/range_coder.h"
 #include "mesh/deformation.h"
+#include "mesh/harmonics.h"
 #include "mesh/smooth_basis.h"
 
 namespace kinespace {
@@ -56,6 +57,21 @@ NodeGraph graph_of_functions(const Points& key, const SmoothBasis& basis) {
   return out;
 }
 
+// Eigenvectors have no place on the mesh: those of nearly equal eigenvalues are near.
+NodeGraph graph_by_number(int functions) {
+  constexpr int reach = static_cast<int>(near_anchors);
+  NodeGraph out;
+  out.first.push_back(0);
+  for (int k = 0; k < functions; ++k) {
+    for (int m = std::max(k - reach, 0); m <= std::min(k + reach, functions - 1); ++m) {
+      if (m != k) out.near.push_back(m);
+    }
+    out.first.push_back(static_cast<std::int32_t>(out.near.size()));
+    out.band.push_back(static_cast<std::uint8_t>(std::min(bit_length(static_cast<std::uint64_t>(k)), 14)));
+  }
+  return out;
+}
+
 NodeGraph graph_of_vertices(const Neighbours& neighbours) {
   NodeGraph out;
   out.first.push_back(0);
@@ -71,22 +87,34 @@ NodeGraph graph_of_vertices(const Neighbours& neighbours) {
 }  // namespace
 
 struct HarmonicsSpace::Basis {
-  SmoothBasis functions;
+  Basis(const Points& key, const SmoothBasis& basis)
+      : functions(basis.functions), graph(graph_of_functions(key, basis)) {}
+  explicit Basis(Eigen::MatrixXd eigenvectors)
+      : functions(std::move(eigenvectors)), graph(graph_by_number(static_cast<int>(functions.cols()))) {}
+
+  Eigen::MatrixXd functions;
+  NodeGraph graph;
 };
 
 HarmonicsSpace::HarmonicsSpace(Points key, std::span<const Triangle> triangles, int functions, BasisCache* cache)
     : HarmonicsSpace(key, triangles,
-                     Basis{cache != nullptr ? cache->smooth(key, triangles, functions)
-                                            : smooth_basis(key, triangles, {.functions = functions})}) {}
+                     Basis{key, cache != nullptr ? cache->smooth(key, triangles, functions)
+                                                 : smooth_basis(key, triangles, {.functions = functions})}) {}
 
-HarmonicsSpace::HarmonicsSpace(Points key, std::span<const Triangle> triangles, const Basis& basis)
-    : projection_(basis.functions.functions),
+HarmonicsSpace::HarmonicsSpace(Points key, std::span<const Triangle> triangles, Basis basis)
+    : projection_(basis.functions),
       neighbours_(static_cast<int>(key.rows()), triangles),
       key_coefficients_(projection_.coefficients(key)),
       key_low_(projection_.synthesise(key_coefficients_)),
       detail_(key - key_low_),
-      function_graph_(graph_of_functions(key, basis.functions)),
+      function_graph_(std::move(basis.graph)),
       vertex_graph_(graph_of_vertices(neighbours_)) {}
+
+std::shared_ptr<const HarmonicsSpace> HarmonicsSpace::of_eigenvectors(Points key, std::span<const Triangle> triangles,
+                                                                      int functions) {
+  Basis basis(manifold_harmonics(key, triangles, {.functions = functions, .tolerance = 1e-7}).functions);
+  return std::shared_ptr<const HarmonicsSpace>(new HarmonicsSpace(std::move(key), triangles, std::move(basis)));
+}
 
 std::vector<Eigen::Matrix3d> HarmonicsSpace::rotations(const Points& low, bool rotate) const {
   if (!rotate) return {};
@@ -112,14 +140,10 @@ Points HarmonicsSpace::frame(const Points& low, bool rotate, std::span<const dou
 }
 
 Coefficients HarmonicsSpace::coefficients(const Points& wanted, bool rotate) const {
-  constexpr int iterations = 3;
   const Coefficients whole = projection_.coefficients(wanted);
-  Coefficients c = whole;
-  for (int i = 0; rotate && i < iterations; ++i) {
-    const Points low = projection_.synthesise(c);
-    c = whole - projection_.correlations(frame(low, true, {}) - low);
-  }
-  return c;
+  if (!rotate) return whole;
+  const Points low = projection_.synthesise(whole);
+  return whole - projection_.correlations(frame(low, true, {}) - low);
 }
 
 void HarmonicsSpace::residual(const Points& wanted, const Coefficients& c, bool rotate, std::span<double> out) const {

@@ -9,6 +9,7 @@
 // then.
 #pragma once
 
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -25,6 +26,12 @@ class BasisCache;
 
 class HarmonicsSpace {
  public:
+  // With the eigenvectors of mesh/harmonics.h in place of the smooth functions: for comparison, since a stream of them
+  // could be read by the build that made it only.
+  [[nodiscard]] static std::shared_ptr<const HarmonicsSpace> of_eigenvectors(Points key,
+                                                                             std::span<const Triangle> triangles,
+                                                                             int functions);
+
   // `cache`: where the functions may be kept (basis_cache.h), or none.
   HarmonicsSpace(Points key, std::span<const Triangle> triangles, int functions, BasisCache* cache = nullptr);
 
@@ -39,15 +46,15 @@ class HarmonicsSpace {
   [[nodiscard]] const Points& key_low() const { return key_low_; }
   // The frame of a low-frequency part U c; `residual`: three numbers a vertex, or none.
   [[nodiscard]] Points frame(const Points& low, bool rotate, std::span<const double> residual) const;
-  // The coefficients with which frame() is closest to `wanted`, by fixed-point iteration: the details they bring change
-  // little with them.
+  // The coefficients with which frame() is closest to `wanted`, nearly: one step of the fixed-point iteration. The
+  // details they bring change little with them, and further steps lowered no stream's size by more than 0.2 %.
   [[nodiscard]] Coefficients coefficients(const Points& wanted, bool rotate) const;
   // What is missing of `wanted` outside the functions' space, turned back. `c`: as the decoder has them.
   void residual(const Points& wanted, const Coefficients& c, bool rotate, std::span<double> out) const;
 
  private:
   struct Basis;
-  HarmonicsSpace(Points key, std::span<const Triangle> triangles, const Basis& basis);
+  HarmonicsSpace(Points key, std::span<const Triangle> triangles, Basis basis);
   [[nodiscard]] std::vector<Eigen::Matrix3d> rotations(const Points& low, bool rotate) const;
 
   Projection projection_;

@@ -22,11 +22,17 @@ std::vector<float> in_units(const NodeValues& values, double step) {
   return out;
 }
 
-// How many of the columns are worth coding.
-int columns_above(const Eigen::MatrixXd& weights, double least) {
-  Eigen::Index count = weights.cols();
-  while (count > 0 && weights.col(count - 1).cwiseAbs().maxCoeff() < least) --count;
-  return static_cast<int>(count);
+// The largest number of each column of table * functions, a few columns at a time: the product would take as much
+// memory as the table.
+Eigen::VectorXd peaks(const Eigen::MatrixXd& table, const Eigen::MatrixXd& functions) {
+  constexpr Eigen::Index together = 32;
+  Eigen::VectorXd out(functions.cols());
+  for (Eigen::Index first = 0; first < functions.cols(); first += together) {
+    const Eigen::Index count = std::min(together, functions.cols() - first);
+    const Eigen::MatrixXd weights = table * functions.middleCols(first, count);
+    out.segment(first, count) = weights.cwiseAbs().colwise().maxCoeff().transpose();
+  }
+  return out;
 }
 
 Bytes pack(FrameTransform transform, int components, const Bytes& basis, const Bytes& values) {
@@ -49,36 +55,41 @@ void MovingPart::add(int frame, std::span<double> out) const {
 }
 
 PartCoder::PartCoder(const Eigen::MatrixXd& table, const NodeGraph& graph) : table_(table), graph_(graph) {
-  const Eigen::MatrixXd gram = table.transpose() * table;
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(table.cols(), table.cols());
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(table.transpose());
+  gram.triangularView<Eigen::StrictlyUpper>() = gram.transpose();
   energy_ = gram.trace();
   components_ = principal_components(gram);
+  component_peaks_ = peaks(table, components_.functions);
+  cosine_peaks_ = peaks(table, cosine_basis(static_cast<int>(table.cols())));
 }
 
-CodedPart PartCoder::code(const PartOptions& options) const {
-  const auto frames = static_cast<int>(table_.cols());
+int PartCoder::worth_coding(FrameTransform transform, double step) const {
+  const Eigen::VectorXd& peaks = transform == FrameTransform::cosines ? cosine_peaks_ : component_peaks_;
+  Eigen::Index count = peaks.size();
+  while (count > 0 && peaks[count - 1] < least_weight * step) --count;
+  return static_cast<int>(count);
+}
+
+CodedPart PartCoder::code(const PartOptions& options, const Eigen::MatrixXd& table, double energy) const {
+  const int kept = worth_coding(options.transform, options.step);
   CodedPart out;
   Bytes basis;
   if (options.transform == FrameTransform::cosines) {
-    out.part.functions = cosine_basis(frames);
+    out.part.functions = cosine_basis(static_cast<int>(table.cols())).leftCols(kept);
   } else {
-    const Eigen::MatrixXd weights = table_ * components_.functions;
-    const int kept = columns_above(weights, least_weight * options.step);
     std::vector<double> sizes(static_cast<std::size_t>(kept));
     for (int r = 0; r < kept; ++r) sizes[static_cast<std::size_t>(r)] = components_.sizes[r] / options.step;
     auto coded = encode_frame_basis(components_.functions.leftCols(kept), sizes, options.coarseness);
     basis = std::move(coded.bytes);
     out.part.functions = std::move(coded.functions);
   }
-  const Eigen::MatrixXd weights = table_ * out.part.functions;
-  const int kept = options.transform == FrameTransform::cosines ? columns_above(weights, least_weight * options.step)
-                                                                : static_cast<int>(weights.cols());
-  out.part.functions.conservativeResize(Eigen::NoChange, kept);
+  const Eigen::MatrixXd weights = table * out.part.functions;
   NodeValues wanted{.components = kept, .value = {}};
-  wanted.value.resize(static_cast<std::size_t>(weights.rows()) * static_cast<std::size_t>(kept));
+  wanted.value.resize(static_cast<std::size_t>(weights.size()));
   for (std::size_t i = 0; i < wanted.value.size(); ++i) wanted.value[i] = weights.data()[i] / options.step;
   const CodedNodes coded = encode_nodes(wanted, graph_, options.rate_weight);
-  out.squared_error =
-      energy_ - weights.leftCols(kept).squaredNorm() + options.step * options.step * coded.squared_error;
+  out.squared_error = energy - weights.squaredNorm() + options.step * options.step * coded.squared_error;
   out.part.nodes = graph_.nodes();
   out.part.weights = in_units(coded.decoded, options.step);
   out.bytes = pack(options.transform, kept, basis, coded.bytes);

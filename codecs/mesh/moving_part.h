@@ -45,13 +45,21 @@ class PartCoder {
  public:
   // `table`: a column for each frame, 3 * graph.nodes() rows. Both must outlive the coder.
   PartCoder(const Eigen::MatrixXd& table, const NodeGraph& graph);
-  [[nodiscard]] CodedPart code(const PartOptions& options) const;
-  [[nodiscard]] double energy() const { return energy_; }
+  [[nodiscard]] CodedPart code(const PartOptions& options) const { return code(options, table_, energy_); }
+  // Another table that differs little, in the components of this one.
+  [[nodiscard]] CodedPart code(const PartOptions& options, const Eigen::MatrixXd& table) const {
+    return code(options, table, table.squaredNorm());
+  }
 
  private:
+  [[nodiscard]] CodedPart code(const PartOptions& options, const Eigen::MatrixXd& table, double energy) const;
+  // How many functions of time have a weight that is worth coding, to the last such.
+  [[nodiscard]] int worth_coding(FrameTransform transform, double step) const;
+
   const Eigen::MatrixXd& table_;
   const NodeGraph& graph_;
   PrincipalComponents components_;
+  Eigen::VectorXd component_peaks_, cosine_peaks_;  // largest weight of each function
   double energy_ = 0;
 };
 
