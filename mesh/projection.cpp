@@ -17,9 +17,10 @@ struct Shape {
   int vertices, functions;
 };
 
-// Three coordinates of up to `block` vertices, zeros behind them.
+// Three coordinates of up to `block` vertices, zeros behind them, all set by load(). (Clang loses constructors that
+// only functions with clones use, so there is none.)
 struct Tile {
-  double x[3][block] = {};
+  double x[3][block];
 
   void load(const Shape& shape, const double* points, int first) {
     const int count = std::min(block, shape.vertices - first);
