@@ -43,6 +43,7 @@ class Encoder {
     setup_.clusters = choice.clusters;
     setup_.size = diagonal(mesh);
     frames_.track = quantised(rigid_motions(mesh, 0), setup_.size);
+    track_bytes_ = pack_track(frames_.track);
     frames_.cluster_of = clusters_.of;
     members_ = members_of(clusters_);
     make_keys(key_step);
@@ -90,7 +91,7 @@ class Encoder {
     out.add_section("setup", std::move(header).take());
     out.add_section("surface", packed_.surface);
     out.add_section("order", packed_.order);
-    out.add_section("rigid", pack_track(frames_.track));
+    out.add_section("rigid", track_bytes_);
     out.add_section("clusters", pack_clusters(clusters_));
     for (std::size_t j = 0; j < attempt.parts.size(); ++j) {
       out.add_section(fmt::format("a{}", j), attempt.parts[j].coefficients);
@@ -103,7 +104,12 @@ class Encoder {
   [[nodiscard]] Points aligned(int f) const {
     return frames_.track.motion(static_cast<std::size_t>(f)).undo(frame_points(mesh_, f));
   }
-  [[nodiscard]] std::size_t fixed_bytes() const { return packed_.surface.size() + packed_.order.size() + 600; }
+  // All but coefficients and predictions; of the container about.
+  [[nodiscard]] std::size_t fixed_bytes() const {
+    const std::size_t container = 250 + 40 * members_.size();
+    return packed_.surface.size() + packed_.order.size() + track_bytes_.size() + pack_clusters(clusters_).size() +
+           container;
+  }
   void make_keys(double key_step) {
     std::vector<Points> keys;
     for (const std::int32_t m : clusters_.medoid) keys.push_back(aligned(m));
@@ -168,6 +174,7 @@ class Encoder {
   Clusters clusters_;
   PaperSetup setup_;
   PaperFrames frames_;  // with exact coefficients
+  Bytes track_bytes_;
   std::vector<std::vector<int>> members_;
   std::vector<std::vector<double>> tables_;
   PackedKeyMesh packed_;
@@ -248,11 +255,14 @@ class Search {
     for (double kg = usual_kg; kg < 50; kg *= 2) {
       const Encoder encoder = encoder_of(choice, kg);
       const auto size = [&](double fineness) { return encoder.code(1 / fineness).bytes; };
-      const double fineness =
-          largest_step(1 / (first_step * rms(kg)), 1e-3 / spread_, static_cast<double>(bytes), 0.02, 12, size);
-      if (fineness == 0) continue;
-      Bytes out = encoder.encode(1 / fineness).stream;
-      if (static_cast<std::int64_t>(out.size()) <= bytes) return out;
+      auto room = static_cast<double>(bytes);
+      for (int round = 0; round < 2 && room > 0; ++round) {
+        const double fineness = largest_step(1 / (first_step * rms(kg)), 1e-3 / spread_, room, 0.02, 12, size);
+        if (fineness == 0) break;
+        Bytes out = encoder.encode(1 / fineness).stream;
+        if (static_cast<std::int64_t>(out.size()) <= bytes) return out;
+        room -= static_cast<double>(out.size()) - static_cast<double>(bytes) + 8;
+      }
     }
     throw Error(ErrorKind::usage,
                 {.found = fmt::format("{} bytes for the stream", bytes), .expected = "more for this sequence"});

@@ -9,8 +9,10 @@
 #include <tbb/global_control.h>
 
 #include "base/error.h"
+#include "codecs/mesh/harmonics_analysis.h"
 #include "mesh/connectivity.h"
 #include "mesh/mesh_error.h"
+#include "mesh/rigid.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {
@@ -53,6 +55,23 @@ TEST_P(MeshCodec, errors_asked_for_are_met_and_told) {
     EXPECT_GT(reader->connectivity_bytes(), 0);
     EXPECT_LT(reader->connectivity_bytes(), static_cast<std::int64_t>(stream.size()));
   }
+}
+
+void expect_coarser_is_cheaper(const char* codec, MeshProfile profile, const std::vector<double>& targets) {
+  const MeshSequence mesh = bending_tube(500, 12, 1.5);
+  std::size_t finer = std::numeric_limits<std::size_t>::max();
+  for (const double kg : targets) {
+    const std::size_t bytes = encode_mesh(codec, mesh, {.kg = kg, .profile = profile}).size();
+    EXPECT_LE(bytes, finer) << codec << " at " << kg;
+    finer = bytes;
+  }
+}
+
+// Not mesh-draco: Draco's own coding differs from grid to grid.
+TEST(MeshCodecs, coarser_targets_cost_no_more_bytes) {
+  expect_coarser_is_cheaper("mesh-harmonics", MeshProfile::standard, {0.15, 0.3, 0.6, 1.2, 2.4});
+  expect_coarser_is_cheaper("mesh-harmonics", MeshProfile::paper, {0.3, 0.5, 0.7, 1.2, 2.4});
+  expect_coarser_is_cheaper("mesh-pca", MeshProfile::standard, {0.15, 0.3, 0.6, 1.2, 2.4});
 }
 
 TEST_P(MeshCodec, bytes_asked_for_are_kept_to) {
@@ -209,6 +228,23 @@ TEST(MeshHarmonics, multi_resolution_keeps_to_the_error_or_says_that_it_cannot) 
       Error);
 }
 
+TEST(MeshHarmonics, estimates_are_close_to_what_is_encoded_and_take_eigenvectors_too) {
+  const MeshSequence mesh = bending_tube(900, 12, 1.5);
+  const Progress silent;
+  HarmonicsSettings settings{.key = 4, .functions = 120, .key_step = 0.01 * diagonal(mesh)};
+  const HarmonicsAnalysis smooth(mesh, std::nullopt, settings, silent);
+  settings.eigenvectors = true;
+  const HarmonicsAnalysis eigenvectors(mesh, std::nullopt, settings, silent);
+  const double step = 0.02 * diagonal(mesh);
+  const auto estimate = smooth.estimate(step);
+  const auto trial = smooth.encode(step);
+  const auto bytes = static_cast<double>(estimate.bytes);
+  EXPECT_NEAR(bytes, static_cast<double>(trial.attempt.bytes), 0.1 * bytes);
+  const double error = std::sqrt(estimate.squared_error);
+  EXPECT_NEAR(error, std::sqrt(trial.attempt.squared_error), 0.1 * error);
+  EXPECT_LT(std::abs(std::log(eigenvectors.estimate(step).squared_error / estimate.squared_error)), 0.5);
+}
+
 TEST(MeshHarmonics, long_sequences_are_cut_into_blocks) {
   const MeshSequence mesh = bending_tube(60, 900, 1.5);
   const Bytes stream = encode_mesh("mesh-harmonics", mesh, {.kg = 1.0, .bases = 20});
@@ -232,6 +268,31 @@ TEST(PaperProfile, without_a_target_it_spends_no_more_than_half_a_percent_asks_f
   const Bytes stream = encode_mesh("mesh-harmonics", mesh, {.profile = MeshProfile::paper});
   EXPECT_LE(kg_of(mesh, stream), 0.5);
   EXPECT_GT(kg_of(mesh, stream), 0.3);
+}
+
+TEST(PaperProfile, number_of_threads_changes_nothing) {
+  std::vector<Bytes> streams;
+  std::vector<std::vector<float>> positions;
+  for (const std::size_t threads : {1U, 3U}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    streams.push_back(
+        encode_mesh("mesh-harmonics", tube(), {.profile = MeshProfile::paper, .bases = 40, .clusters = 3}));
+    positions.push_back(decoded(streams.back()).positions);
+  }
+  EXPECT_EQ(streams[0], streams[1]);
+  EXPECT_EQ(positions[0], positions[1]);
+}
+
+TEST(PaperProfile, bytes_asked_for_are_kept_to_or_refused) {
+  const MeshSequence mesh = tube();
+  const auto at = [&](std::int64_t bytes) {
+    return encode_mesh("mesh-harmonics", mesh, {.bytes = bytes, .profile = MeshProfile::paper, .bases = 100});
+  };
+  const auto usual = static_cast<std::int64_t>(
+      encode_mesh("mesh-harmonics", mesh, {.kg = 0.6, .profile = MeshProfile::paper, .bases = 100}).size());
+  for (const std::int64_t bytes : {usual, usual * 4 / 5}) EXPECT_LE(static_cast<std::int64_t>(at(bytes).size()), bytes);
+  EXPECT_LT(kg_of(mesh, at(usual)), kg_of(mesh, at(usual * 4 / 5)));
+  EXPECT_THROW(static_cast<void>(at(200)), Error);
 }
 
 TEST(PaperProfile, errors_asked_for_are_met_or_refused) {
