@@ -111,11 +111,13 @@ Bytes encode_repeat_profile(std::span<const Clip> clips, const CodecTarget& targ
   if (target.mean_error_cm) step = steps_of_error * *target.mean_error_cm;
   if (target.max_error_cm) step = steps_of_error * *target.max_error_cm / 8;
   double planned = 0;
+  bool predicted = false;  // by any attempt
   const auto attempt_at = [&](double at, bool predict) {
     if (planned == 0 || at > 1.6 * planned || at < planned / 1.6) {
       encoder.plan(at);
       planned = at;
     }
+    predicted = predicted || (predict && encoder.predicts());
     const RepeatAttempt made = encoder.attempt(at, predict);
     const MeasuredError error = made.error.measured();
     return CodedAttempt{write_repeat_stream(made, error), error};
@@ -126,15 +128,15 @@ Bytes encode_repeat_profile(std::span<const Clip> clips, const CodecTarget& targ
                          [&](double at) { return attempt_at(at, predict); });
   };
   Bytes best = meet(settings.repeats);
-  if (!settings.repeats || !encoder.predicts()) return best;
+  if (!predicted) return best;
   // Never more than with every clip unique.
   planned = 0;
   Bytes alone = meet(false);
-  if (!target.any()) {
-    const double told = Bitstream::parse(best, "").error().mean_joint_error_cm;
-    const double untold = Bitstream::parse(alone, "").error().mean_joint_error_cm;
-    return alone.size() <= best.size() && untold <= told ? alone : best;
-  }
+  const double told = Bitstream::parse(best, "").error().mean_joint_error_cm;
+  const double untold = Bitstream::parse(alone, "").error().mean_joint_error_cm;
+  // Of two within a size the nearer one, of two within an error the smaller one.
+  if (target.bytes) return untold < told ? alone : best;
+  if (!target.any()) return alone.size() <= best.size() && untold <= told ? alone : best;
   return alone.size() < best.size() ? alone : best;
 }
 
