@@ -87,11 +87,14 @@ CodedMesh code_mesh(std::string_view codec, const MeshSequence& mesh, const Mesh
 
 double milliseconds_a_frame(const MeshStreamReader& reader) {
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
-  double best = std::numeric_limits<double>::infinity();
-  for (int f = 0; f < std::min(reader.layout().frames, 12); ++f) {
-    best = std::min(best, 1000 * seconds([&] { static_cast<void>(reader.frame(f)); }));
+  constexpr int looked_at = 9;
+  std::vector<double> all;
+  for (int i = 0; i < looked_at; ++i) {
+    const int f = (2 * i + 1) * reader.layout().frames / (2 * looked_at);
+    all.push_back(1000 * least_of_three([&] { static_cast<void>(reader.frame(f)); }));
   }
-  return best;
+  std::sort(all.begin(), all.end());
+  return all[looked_at / 2];  // key-frames cost next to nothing
 }
 
 BasisSeconds basis_seconds(const MeshSequence& mesh, int functions) {
@@ -113,11 +116,11 @@ ProjectionError projection_error(const MeshSequence& mesh, int functions) {
               mesh, motions, Projection(manifold_harmonics(key, mesh.triangles, {.functions = functions}).functions))};
 }
 
-double estimated_bpvf(const MeshSequence& mesh, double kg, bool eigenvectors) {
+double estimated_bpvf(const MeshSequence& mesh, double kg, int functions, bool eigenvectors) {
   const double spread = spread_of(mesh);
   const double rms = kg / 100 * spread / std::sqrt(3.0 * mesh.vertices * mesh.frames);
   const HarmonicsSettings settings{.key = cluster_frames(mesh, {.clusters = 1}).medoid[0],
-                                   .functions = std::min(400, mesh.vertices),
+                                   .functions = std::min(functions, mesh.vertices),
                                    .key_step = harmonics_key_steps * rms,
                                    .eigenvectors = eigenvectors};
   const Progress silent;

@@ -28,7 +28,7 @@ struct CodedMesh {
 // long as making it.
 [[nodiscard]] CodedMesh encode_only(std::string_view codec, const MeshSequence& mesh, const MeshCodecOptions& options);
 
-// On one core; the least of a few frames, since other programs only slow it down.
+// On one core; the median frame of a few, each the least of three times, since other programs only slow it down.
 [[nodiscard]] double milliseconds_a_frame(const MeshStreamReader& reader);
 
 // Seconds on one core, the least of three.
@@ -45,8 +45,8 @@ struct ProjectionError {
 };
 [[nodiscard]] ProjectionError projection_error(const MeshSequence& mesh, int functions);
 
-// Bits per vertex and frame of the standard profile at a KG, by its own estimate, on 400 functions of either kind.
-[[nodiscard]] double estimated_bpvf(const MeshSequence& mesh, double kg, bool eigenvectors);
+// Bits per vertex and frame of the standard profile at a KG, by its own estimate, on functions of either kind.
+[[nodiscard]] double estimated_bpvf(const MeshSequence& mesh, double kg, int functions, bool eigenvectors);
 
 // The most memory that the process held while `work` ran, GiB. What it held before counts.
 [[nodiscard]] double peak_memory_gib(const std::function<void()>& work);

@@ -14,14 +14,15 @@ namespace kinespace {
 class MeshTables {
  public:
   // The paper's rows for a sequence (none for one it does not have), each with our figures beside its own.
-  void measure(const std::string& name, const MeshSequence& mesh);
+  // `standard_s`: what the standard profile takes to encode it at KG 0.5 %.
+  void measure(const std::string& name, const MeshSequence& mesh, double standard_s);
   // Rates and errors of the rows of that sequence: the profile's curve in figure 11.
   [[nodiscard]] std::vector<PlotSeries::Point> curve(const std::string& name) const;
   void add_to(BenchReport& report) &&;
 
  private:
   void measure_clusters(const std::string& name, const MeshSequence& mesh);
-  void measure_times(const std::string& name, const MeshSequence& mesh);
+  void measure_times(const std::string& name, const MeshSequence& mesh, double standard_s);
 
   struct NamedPoint {
     std::string name;

@@ -146,6 +146,17 @@ HarmonicsAnalysis::Trial HarmonicsAnalysis::encode(double step) const {
   return out;
 }
 
+std::int64_t HarmonicsAnalysis::size(const Trial& trial) const {
+  constexpr std::int64_t errors = 24;  // their numbers have more digits than none
+  return static_cast<std::int64_t>(stream_of(trial.attempt, {.kg = trial.kg}).size()) + errors;
+}
+
+double HarmonicsAnalysis::residual_energy() const {
+  double sum = 0;
+  for (const BlockTables& block : blocks_) sum += block.detail->energy();
+  return sum;
+}
+
 Bytes HarmonicsAnalysis::finish(const Trial& trial) const {
   return stream_of(trial.attempt, compare(mesh_, trial.decoded));
 }

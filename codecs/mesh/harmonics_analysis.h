@@ -48,6 +48,8 @@ class HarmonicsAnalysis {
     double kg = 0;
   };
   [[nodiscard]] Trial encode(double step) const;
+  // Bytes of a trial's stream, or a little more: its measured error is not known yet.
+  [[nodiscard]] std::int64_t size(const Trial& trial) const;
   // The stream of a trial, with its whole measured error: lr takes as long as coding.
   [[nodiscard]] Bytes finish(const Trial& trial) const;
 
@@ -55,6 +57,8 @@ class HarmonicsAnalysis {
   [[nodiscard]] double coded_vertices() const { return coded().vertices; }
   // Of the parts that do not depend on the step.
   [[nodiscard]] std::int64_t fixed_bytes() const;
+  // Squared sum of what the functions leave out of the frames.
+  [[nodiscard]] double residual_energy() const;
 
  private:
   struct BlockTables {

@@ -51,6 +51,9 @@ class PartCoder {
     return code(options, table, table.squaredNorm());
   }
 
+  // Squared sum of the table.
+  [[nodiscard]] double energy() const { return energy_; }
+
  private:
   [[nodiscard]] CodedPart code(const PartOptions& options, const Eigen::MatrixXd& table, double energy) const;
   // How many functions of time have a weight that is worth coding, to the last such.
