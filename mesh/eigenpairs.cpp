@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 #include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include <Eigen/Eigenvalues>
@@ -17,6 +18,12 @@ namespace {
 
 constexpr Eigen::Index half_band = 30;  // pairs on each side of a shift
 constexpr int most_restarts = 100;
+
+// What its numbers are of the size of.
+double unit_of(const SparseMatrix& matrix) {
+  const double mean = matrix.diagonal().mean();
+  return mean > 0 ? mean : 1;
+}
 
 // A - shift I, factored.
 class Shifted {
@@ -81,8 +88,12 @@ Found nearest_pairs(const Shifted& shifted, double shift, Eigen::Index count, co
   if (count < 1) return std::nullopt;
   Inverse inverse(shifted, known);
   Spectra::SymEigsShiftSolver<Inverse> solver(inverse, count, std::clamp(space, count + 1, most), shift);
-  solver.init();
-  solver.compute(Spectra::SortRule::LargestMagn, most_restarts, tolerance, Spectra::SortRule::SmallestAlge);
+  try {
+    solver.init();
+    solver.compute(Spectra::SortRule::LargestMagn, most_restarts, tolerance, Spectra::SortRule::SmallestAlge);
+  } catch (const std::runtime_error&) {
+    return std::nullopt;  // so Spectra says that its small dense problem did not converge
+  }
   if (solver.info() != Spectra::CompInfo::Successful) return std::nullopt;
   return Eigenpairs{solver.eigenvectors(), solver.eigenvalues()};
 }
@@ -108,7 +119,7 @@ class Bands {
       : matrix_(matrix),
         count_(count),
         tolerance_(tolerance),
-        unit_(std::max(matrix.diagonal().mean(), 1e-300)),
+        unit_(unit_of(matrix)),
         shifted_(matrix),
         counter_(matrix),
         vectors_(matrix.rows(), count),
@@ -237,7 +248,7 @@ class Bands {
 
 // All at once: slow, and nothing says that no pair is missing.
 Eigenpairs one_band(const SparseMatrix& matrix, int count, double tolerance) {
-  const double shift = -1e-6 * std::max(matrix.diagonal().mean(), 1e-300);
+  const double shift = -1e-6 * unit_of(matrix);
   Shifted shifted(matrix);
   const Eigen::MatrixXd none(matrix.rows(), 0);
   Found found;
@@ -249,6 +260,9 @@ Eigenpairs one_band(const SparseMatrix& matrix, int count, double tolerance) {
 }  // namespace
 
 Eigenpairs smallest_eigenpairs(const SparseMatrix& matrix, int count, double tolerance) {
+  if (matrix.squaredNorm() == 0) {  // a mesh without size: any vectors do
+    return {Eigen::MatrixXd::Identity(matrix.rows(), count), Eigen::VectorXd::Zero(count)};
+  }
   if (Found found = Bands(matrix, count, tolerance).find()) return std::move(*found);
   return one_band(matrix, count, tolerance);
 }

@@ -105,6 +105,14 @@ TEST(Eigenpairs, of_several_bands_are_those_of_a_dense_solver) {
   EXPECT_LT((turned * turned.transpose() - Eigen::MatrixXd::Identity(last, last)).cwiseAbs().maxCoeff(), 1e-7);
 }
 
+TEST(Harmonics, of_a_mesh_without_size_are_some_orthonormal_functions) {
+  const MeshSequence mesh = bending_tube(700, 1, 0);
+  const Points nothing = Points::Zero(mesh.vertices, 3);
+  const Harmonics h = manifold_harmonics(nothing, mesh.triangles, {.functions = 40});
+  EXPECT_LT(worst_orthonormality(h), 1e-9);
+  EXPECT_LT(h.eigenvalues.maxCoeff(), 1e-9);
+}
+
 TEST(Harmonics, come_out_the_same_every_time) {
   const MeshSequence mesh = bending_tube(1200, 1, 1.5);
   const Points points = frame_points(mesh, 0);
