@@ -49,11 +49,7 @@ class MeshBench {
     std::move(tables_).add_to(report_);
     report_.tables.push_back(std::move(rates_));
     report_.tables.push_back(std::move(spaces_));
-    const Plot plot{.title = "chen2019, figure 11: rate and distortion",
-                    .x = {.label = "bits per vertex and frame", .logarithmic = true},
-                    .y = {.label = "KG error, percent", .logarithmic = true},
-                    .series = std::move(curves_)};
-    report_.pictures.push_back({.name = "mesh-rate-distortion", .svg = to_svg(plot)});
+    for (const Sequence& sequence : sequences()) draw(sequence.name);
     return std::move(report_);
   }
 
@@ -67,10 +63,24 @@ class MeshBench {
   // A row of the table of rates, and a point of the codec's curve.
   void note(const std::string& sequence, const std::string& codec, const MeshPoint& p) {
     rates_.rows.push_back({sequence, codec, p.kg, p.bpvf, p.without_connectivity, p.lr, p.encode_s});
-    const std::string name = sequence + ", " + codec;
-    auto curve = std::find_if(curves_.begin(), curves_.end(), [&](const PlotSeries& c) { return c.name == name; });
-    if (curve == curves_.end()) curve = curves_.insert(curve, {.name = name, .points = {}});
-    curve->points.push_back({p.bpvf, p.kg});
+    const auto of_codec = [&](const Curve& c) { return c.sequence == sequence && c.series.name == codec; };
+    auto curve = std::find_if(curves_.begin(), curves_.end(), of_codec);
+    if (curve == curves_.end()) curve = curves_.insert(curve, {sequence, {.name = codec, .points = {}}});
+    curve->series.points.push_back({p.bpvf, p.kg});
+  }
+
+  // Figure 11, a picture for each sequence.
+  void draw(const std::string& sequence) {
+    Plot plot{.title = "chen2019, figure 11: rate and distortion of " + sequence,
+              .x = {.label = "bits per vertex and frame", .logarithmic = true},
+              .y = {.label = "KG error, percent", .logarithmic = true},
+              .series = {}};
+    for (Curve& curve : curves_) {
+      if (curve.sequence != sequence) continue;
+      std::ranges::sort(curve.series.points, {}, &PlotSeries::Point::x);
+      plot.series.push_back(curve.series);
+    }
+    report_.pictures.push_back({.name = "mesh-rate-distortion-" + sequence, .svg = to_svg(plot)});
   }
 
   void measure(const Sequence& sequence, const MeshSequence& mesh) {
@@ -115,8 +125,7 @@ class MeshBench {
       note(sequence.name, "profile paper", p);
     }
     tables_.measure(sequence.name, mesh, standard_s_);
-    curves_.push_back(
-        {.name = sequence.name + ", profile paper as in the tables", .points = tables_.curve(sequence.name)});
+    curves_.push_back({sequence.name, {.name = "paper, tables 2 to 4", .points = tables_.curve(sequence.name)}});
   }
 
   // Smooth functions against eigenvectors in their place.
@@ -173,7 +182,11 @@ class MeshBench {
   BenchTable spaces_{.title = "KG of frames projected on functions of the first, percent",
                      .columns = {"sequence", "functions", "smooth", "eigenvectors", "ratio"},
                      .rows = {}};
-  std::vector<PlotSeries> curves_;
+  struct Curve {
+    std::string sequence;
+    PlotSeries series;
+  };
+  std::vector<Curve> curves_;
 };
 
 }  // namespace
