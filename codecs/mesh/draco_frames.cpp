@@ -75,7 +75,7 @@ Bytes stream_on(const MeshSequence& mesh, const std::vector<Triangle>& triangles
     out.add_section(fmt::format("f{}", f), frames[f].surface);
     if (frames[f].order != frames[0].order) out.add_section(fmt::format("o{}", f), frames[f].order);
   }
-  return out.finish();
+  return finish_mesh_stream(std::move(out), layout_of(mesh));
 }
 
 class DracoReader final : public MeshStreamReader {

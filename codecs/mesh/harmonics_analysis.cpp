@@ -181,7 +181,7 @@ Bytes HarmonicsAnalysis::stream_of(const Attempt& attempt, const MeshError& erro
     out.add_section(fmt::format("m{}", b), attempt.motion[b]);
     out.add_section(fmt::format("d{}", b), attempt.detail[b]);
   }
-  return out.finish();
+  return finish_mesh_stream(std::move(out), setup.layout);
 }
 
 }  // namespace kinespace

@@ -9,6 +9,10 @@ namespace kinespace {
 namespace {
 
 constexpr double most_steps = 1 << 28;
+// What is believed of a stream however small, and for each of its bytes: numbers of a table, positions of all frames.
+constexpr std::int64_t free_numbers = std::int64_t{1} << 21;
+constexpr std::int64_t free_positions = std::int64_t{1} << 24;
+constexpr std::int64_t numbers_a_byte = 1024;
 
 std::int64_t get_limited(ByteReader& in, std::int64_t least, std::int64_t most, const char* what) {
   const std::uint64_t value = get_varint(in);
@@ -21,7 +25,18 @@ std::int64_t get_limited(ByteReader& in, std::int64_t least, std::int64_t most, 
 }  // namespace
 
 std::int64_t most_mesh_numbers(std::uint64_t stream_bytes) {
-  return (std::int64_t{1} << 21) + 1024 * static_cast<std::int64_t>(std::min<std::uint64_t>(stream_bytes, 1U << 20U));
+  return free_numbers + numbers_a_byte * static_cast<std::int64_t>(std::min<std::uint64_t>(stream_bytes, 1U << 20U));
+}
+
+Bytes finish_mesh_stream(BitstreamWriter out, const MeshLayout& layout, std::int64_t numbers) {
+  Bytes bytes = out.finish();
+  const std::int64_t positions = std::int64_t{layout.vertices} * layout.frames;
+  const std::int64_t needed = std::max(positions - free_positions, numbers - free_numbers);
+  const auto size = static_cast<std::int64_t>(bytes.size());
+  const std::int64_t missing = (std::max<std::int64_t>(needed, 0) + numbers_a_byte - 1) / numbers_a_byte - size;
+  if (missing <= 0) return bytes;
+  out.add_section("padding", Bytes(static_cast<std::size_t>(missing), std::byte{0}));
+  return out.finish();
 }
 
 MeshLayout layout_of(const MeshSequence& mesh) {
@@ -48,7 +63,7 @@ MeshLayout get_layout(ByteReader& in, std::uint64_t stream_bytes) {
   out.vertices = static_cast<int>(get_limited(in, 1, std::min(most_vertices, 65536 + 64 * bytes), "vertices"));
   out.frames = static_cast<int>(get_limited(in, 1, 1 << 20, "frames"));
   out.triangles = get_limited(in, 0, 131072 + 128 * bytes, "triangles");
-  if (std::int64_t{out.vertices} * out.frames > std::int64_t{1} << 33) {
+  if (std::int64_t{out.vertices} * out.frames > free_positions + numbers_a_byte * bytes) {
     in.fail(std::to_string(out.vertices) + " vertices in " + std::to_string(out.frames) + " frames", "fewer (damaged)");
   }
   return out;

@@ -32,6 +32,10 @@ void put_layout(ByteWriter& out, const MeshLayout& layout);
 // How many numbers a stream of so many bytes may stand for in memory, in any one table.
 [[nodiscard]] std::int64_t most_mesh_numbers(std::uint64_t stream_bytes);
 
+// The finished stream; made longer with zeros where a reader would not believe so few bytes so many positions, or the
+// `numbers` of one of its tables.
+[[nodiscard]] Bytes finish_mesh_stream(BitstreamWriter out, const MeshLayout& layout, std::int64_t numbers = 0);
+
 // x = origin + step * q.
 struct Grid {
   std::array<double, 3> origin{};

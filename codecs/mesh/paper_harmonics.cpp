@@ -97,7 +97,9 @@ class Encoder {
       out.add_section(fmt::format("a{}", j), attempt.parts[j].coefficients);
       out.add_section(fmt::format("q{}", j), attempt.parts[j].misses);
     }
-    return {.stream = out.finish(), .kg = error.kg};
+    const auto numbers = std::int64_t{setup.functions} * std::max(std::int64_t{setup.layout.vertices} * setup.clusters,
+                                                                  std::int64_t{setup.layout.frames});
+    return {.stream = finish_mesh_stream(std::move(out), setup.layout, numbers), .kg = error.kg};
   }
 
  private:

@@ -116,7 +116,7 @@ class Coder {
       out.add_section(fmt::format("b{}", b), blocks[b].basis_bytes);
       out.add_section(fmt::format("w{}", b), blocks[b].weight_bytes);
     }
-    return out.finish();
+    return finish_mesh_stream(std::move(out), layout_of(mesh_));
   }
 
   const MeshSequence& mesh_;

@@ -10,6 +10,7 @@
 
 #include "base/error.h"
 #include "codecs/mesh/harmonics_analysis.h"
+#include "codecs/mesh/mesh_layout.h"
 #include "mesh/connectivity.h"
 #include "mesh/mesh_error.h"
 #include "mesh/rigid.h"
@@ -250,6 +251,25 @@ TEST(MeshHarmonics, long_sequences_are_cut_into_blocks) {
   const Bytes stream = encode_mesh("mesh-harmonics", mesh, {.kg = 1.0, .bases = 20});
   EXPECT_LE(kg_of(mesh, stream), 1.0);
   EXPECT_TRUE(open_mesh_stream(stream, "s")->stream().has_section("m2"));
+}
+
+// A still sequence of a million frames takes few bytes; a reader that believed any would be led to fill the memory.
+TEST(MeshLayout, streams_are_long_enough_for_what_they_stand_for) {
+  const MeshLayout layout{.name = "still", .rate_hz = 30, .vertices = 100, .frames = 1 << 20, .triangles = 0};
+  ByteWriter described;
+  put_layout(described, layout);
+  const Bytes written = std::move(described).take();
+  const auto read = [&](std::size_t bytes) {
+    ByteReader in(written, "s");
+    return get_layout(in, bytes).frames;
+  };
+  const Bytes stream = finish_mesh_stream(BitstreamWriter("mesh-codec:mesh-pca"), layout, 5'000'000);
+  EXPECT_EQ(read(stream.size()), layout.frames);
+  EXPECT_GE(most_mesh_numbers(stream.size()), 5'000'000);
+  EXPECT_THROW(static_cast<void>(read(stream.size() / 2)), Error);
+  const MeshLayout small{.name = "small", .rate_hz = 30, .vertices = 100, .frames = 1000, .triangles = 0};
+  EXPECT_FALSE(
+      Bitstream::parse(finish_mesh_stream(BitstreamWriter("mesh-codec:mesh-pca"), small), "s").has_section("padding"));
 }
 
 TEST(PaperProfile, bases_and_clusters_alone_drive_it) {
