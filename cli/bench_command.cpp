@@ -9,6 +9,7 @@
 
 #include "base/file.h"
 #include "cli/commands.h"
+#include "cli/session.h"
 
 namespace kinespace::cli {
 namespace {
@@ -51,6 +52,7 @@ void run_bench(const BenchCommandOptions& options) {
     return;
   }
   if (options.name.empty()) throw CLI::RequiredError("NAME");
+  stop_at_once();
   BenchOptions bench_options{.data = options.data, .device = options.device};
   if (!options.golden.empty()) bench_options.golden = options.golden;
   bench_options.clips = options.clips;

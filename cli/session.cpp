@@ -36,6 +36,13 @@ void catch_stop_signals() {
   }
 }
 
+void stop_at_once() {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    struct sigaction present {};
+    if (::sigaction(signal, nullptr, &present) == 0 && present.sa_handler == remember) ::signal(signal, SIG_DFL);
+  }
+}
+
 int stop_signal() noexcept {
   return caught_signal.load(std::memory_order_relaxed);
 }
