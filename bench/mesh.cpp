@@ -127,7 +127,7 @@ class MeshBench {
       note(sequence.name, "profile paper", p);
     }
     tables_.measure(sequence.name, mesh, standard_s_);
-    curves_.push_back({sequence.name, {.name = "paper, its tables", .points = tables_.curve(sequence.name)}});
+    curves_.push_back({sequence.name, {.name = "paper's K and J", .points = tables_.curve(sequence.name)}});
   }
 
   // Smooth functions against eigenvectors in their place.

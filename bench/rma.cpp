@@ -95,7 +95,7 @@ class RmaBench {
     BenchTable table{
         .title = fmt::format("bytes with every clip unique over bytes with repeats at {} cm, by content, "
                              "{}",
-                             error_cm, set.name),
+                             error_cm, set.names.front()),
         .columns = {"content", "clips", "frames", "in repeated clips %", "paper profile", "default profile"},
         .rows = {}};
     for (auto& [content, clips] : contents) {

@@ -80,7 +80,8 @@ class Search {
         best = std::move(now);
         best_trial = std::move(trial);
       }
-      if (best.analysis && std::abs(std::log(next / kg)) < 0.2) break;
+      const bool near = std::abs(std::log(next / kg)) < 0.2;
+      if (round > 0 && best.analysis && near) break;
       kg = next;
     }
     if (best.analysis) return best.analysis->finish(best_trial);
