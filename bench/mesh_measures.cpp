@@ -23,15 +23,6 @@
 namespace kinespace {
 namespace {
 
-double spread_of(const MeshSequence& mesh) {
-  double sum = 0;
-  for (int f = 0; f < mesh.frames; ++f) {
-    const Points x = frame_points(mesh, f);
-    sum += (x.rowwise() - x.colwise().mean()).squaredNorm();
-  }
-  return std::sqrt(sum);
-}
-
 double least_of_three(const std::function<void()>& work) {
   double best = std::numeric_limits<double>::infinity();
   for (int round = 0; round < 3; ++round) best = std::min(best, seconds(work));
@@ -46,7 +37,7 @@ double projected_kg(const MeshSequence& mesh, const std::vector<RigidMotion>& mo
   });
   double sum = 0;
   for (const double m : missed) sum += m;
-  return 100 * std::sqrt(sum) / spread_of(mesh);
+  return 100 * std::sqrt(sum) / std::sqrt(squared_spread(mesh));
 }
 
 // A line of /proc/self/status, in kB; none where there is no such file.
@@ -117,7 +108,7 @@ ProjectionError projection_error(const MeshSequence& mesh, int functions) {
 }
 
 double estimated_bpvf(const MeshSequence& mesh, double kg, int functions, bool eigenvectors) {
-  const double spread = spread_of(mesh);
+  const double spread = std::sqrt(squared_spread(mesh));
   const double rms = kg / 100 * spread / std::sqrt(3.0 * mesh.vertices * mesh.frames);
   const HarmonicsSettings settings{.key = cluster_frames(mesh, {.clusters = 1}).medoid[0],
                                    .functions = std::min(functions, mesh.vertices),

@@ -36,16 +36,6 @@ double squared_distance(const float* a, const float* b) {
   return sum;
 }
 
-// |A - E(A)|^2 with the centroid of each frame.
-double spread_about_centroids(const MeshSequence& mesh) {
-  double sum = 0;
-  for (int f = 0; f < mesh.frames; ++f) {
-    const Points x = frame_points(mesh, f);
-    sum += (x.rowwise() - x.colwise().mean().eval()).squaredNorm();
-  }
-  return sum;
-}
-
 double spread_about_means_over_time(const MeshSequence& mesh) {
   Points mean = Points::Zero(mesh.vertices, 3);
   // Divided at the end: then equal frames have themselves for a mean, to the last bit, and their spread is none.
@@ -87,6 +77,15 @@ void rigidity(const Neighbours& neighbours, const Points& a, const Points& b, co
 
 }  // namespace
 
+double squared_spread(const MeshSequence& mesh) {
+  double sum = 0;
+  for (int f = 0; f < mesh.frames; ++f) {
+    const Points x = frame_points(mesh, f);
+    sum += (x.rowwise() - x.colwise().mean().eval()).squaredNorm();
+  }
+  return sum;
+}
+
 MeshError compare_positions(const MeshSequence& a, const MeshSequence& b) {
   require_same_shape(a, b);
   MeshError out;
@@ -98,7 +97,7 @@ MeshError compare_positions(const MeshSequence& a, const MeshSequence& b) {
     error += here;
     worst = std::max(worst, here);
   }
-  out.kg = percent(error, spread_about_centroids(a));
+  out.kg = percent(error, squared_spread(a));
   out.kg_time = percent(error, spread_about_means_over_time(a));
   out.max_vertex_error = std::sqrt(worst);
   const double size = diagonal(a);

@@ -35,6 +35,9 @@ struct MeshError {
 // The same without lr, which takes most of the time (it is 0 here): for searches over many settings.
 [[nodiscard]] MeshError compare_positions(const MeshSequence& a, const MeshSequence& b);
 
+// |A - E(A)|^2 with the centroid of each frame, over all frames: kg is 100 sqrt(|A - B|^2 / this).
+[[nodiscard]] double squared_spread(const MeshSequence& mesh);
+
 // Distance of every vertex in one frame, and its share of the frame's lr (already times alpha), for pictures.
 [[nodiscard]] std::vector<double> vertex_errors(const MeshSequence& a, const MeshSequence& b, int frame);
 [[nodiscard]] std::vector<double> vertex_rigidity_errors(const MeshSequence& a, const MeshSequence& b, int frame);

@@ -14,6 +14,7 @@
 #include "base/error.h"
 #include "codecs/mesh/harmonics_analysis.h"
 #include "codecs/mesh/step_search.h"
+#include "mesh/mesh_error.h"
 #include "mesh/rigid.h"
 
 namespace kinespace {
@@ -23,20 +24,11 @@ constexpr double usual_kg = 0.5;
 constexpr int usual_functions = 400;
 constexpr double first_step = 6;  // of coefficients, over the root mean square error: where the search begins
 
-double rms_spread(const MeshSequence& mesh) {
-  double sum = 0;
-  for (int f = 0; f < mesh.frames; ++f) {
-    const Points x = frame_points(mesh, f);
-    sum += (x.rowwise() - x.colwise().mean()).squaredNorm();
-  }
-  return std::sqrt(sum / (3.0 * mesh.vertices * mesh.frames));
-}
-
 class Search {
  public:
   Search(const MeshSequence& mesh, const MeshCodecOptions& options) : mesh_(mesh), options_(options) {
     settings_.key = cluster_frames(mesh, {.clusters = 1}).medoid[0];
-    spread_ = rms_spread(mesh);
+    spread_ = std::sqrt(squared_spread(mesh) / (3.0 * mesh.vertices * mesh.frames));
     if (options.coarse_vertices > 0 && options.coarse_vertices < mesh.vertices) {
       decimation_ = decimate(mesh, {.vertices = options.coarse_vertices, .frame = settings_.key});
       decimation_->triangles = canonical_triangles(decimation_->triangles);

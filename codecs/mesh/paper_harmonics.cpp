@@ -17,6 +17,7 @@
 #include "codecs/mesh/paper_stream.h"
 #include "codecs/mesh/step_search.h"
 #include "mesh/connectivity.h"
+#include "mesh/mesh_error.h"
 
 namespace kinespace {
 namespace {
@@ -184,15 +185,6 @@ class Encoder {
   double floor_ = 0;
 };
 
-double spread_of(const MeshSequence& mesh) {
-  double sum = 0;
-  for (int f = 0; f < mesh.frames; ++f) {
-    const Points x = frame_points(mesh, f);
-    sum += (x.rowwise() - x.colwise().mean()).squaredNorm();
-  }
-  return std::sqrt(sum);
-}
-
 // What is tried, the smallest first.
 std::vector<Choice> choices(const MeshSequence& mesh, const MeshCodecOptions& options) {
   std::vector<Choice> out;
@@ -213,7 +205,7 @@ class Search {
         distances_(frame_distances(mesh)),
         choices_(choices(mesh, options)),
         least_(std::max(diagonal(mesh) * 1e-8, 1e-20)),
-        spread_(std::max(spread_of(mesh), least_)) {}
+        spread_(std::max(std::sqrt(squared_spread(mesh)), least_)) {}
 
   // Of the choices that can meet the target, smallest first, up to the first that costs more than the one before: a
   // small one close to its own floor costs more than the next, and a large one needs more key-frames.
