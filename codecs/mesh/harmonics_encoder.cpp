@@ -64,6 +64,7 @@ class Search {
         kg = std::min(kg * 6, 50.0);
         continue;
       }
+      options_.progress.at("coding", static_cast<double>(round) / most_rounds);
       auto trial = trial_of_bytes(analysis, bytes, now.step);
       const std::int64_t size = analysis.size(trial);
       least = std::min(least, size);
@@ -150,6 +151,7 @@ class Search {
     std::optional<HarmonicsAnalysis::Trial> best;
     double bad = std::numeric_limits<double>::infinity(), bad_error = bad;
     for (int i = 0; i < most_trials; ++i) {
+      options_.progress.at("coding", static_cast<double>(i) / most_trials);
       auto trial = analysis.encode(step);
       const double found = trial.kg;
       if (found <= kg) {
