@@ -81,9 +81,9 @@ PaperSetup get_paper_setup(std::span<const std::byte> bytes, std::uint64_t strea
   const auto vertices = static_cast<std::uint64_t>(out.layout.vertices);
   const auto frames = static_cast<std::uint64_t>(out.layout.frames);
   const auto most = static_cast<std::uint64_t>(most_mesh_numbers(stream_bytes));
+  // As finish_mesh_stream makes room for. vertices <= 2^31, so that no product overflows.
   if (functions < 1 || functions > vertices || clusters < 1 || clusters > frames ||
-      clusters > most / (functions * vertices) + (functions * vertices > most ? 0U : 1U) ||
-      functions * vertices > most || functions * frames > most) {
+      clusters > most / (functions * vertices) || functions * frames > most) {
     in.fail(fmt::format("{} functions and {} key-frames", functions, clusters), "what the encoder writes (damaged)");
   }
   out.functions = static_cast<int>(functions);

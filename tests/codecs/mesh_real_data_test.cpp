@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -12,16 +11,11 @@
 
 #include "codecs/mesh/mesh_codec.h"
 #include "mesh/mesh_files.h"
+#include "tests/mesh/sample_meshes.h"
 #include "tests/support/data.h"
 
 namespace kinespace::test {
 namespace {
-
-std::optional<std::filesystem::path> mesh_folder() {
-  const auto data = data_folder();
-  if (!data || !std::filesystem::exists(*data / "mesh")) return {};
-  return *data / "mesh";
-}
 
 MeshSequence first_frames(const std::filesystem::path& path, int frames) {
   MeshSequence out = read_mesh_sequence(path);

@@ -14,16 +14,11 @@
 #include "mesh/picture.h"
 #include "mesh/rigid.h"
 #include "mesh/smooth_basis.h"
+#include "tests/mesh/sample_meshes.h"
 #include "tests/support/data.h"
 
 namespace kinespace::test {
 namespace {
-
-std::optional<std::filesystem::path> mesh_folder() {
-  const auto data = data_folder();
-  if (!data || !std::filesystem::exists(*data / "mesh")) return {};
-  return *data / "mesh";
-}
 
 double kg_of(const MeshSequence& mesh, const Projection& space, const DetailTransfer* transfer, bool correct) {
   MeshSequence decoded = mesh;

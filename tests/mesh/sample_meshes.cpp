@@ -5,6 +5,8 @@
 
 #include <Eigen/Geometry>
 
+#include "tests/support/data.h"
+
 namespace kinespace::test {
 namespace {
 
@@ -101,6 +103,12 @@ MeshSequence moved_rigidly(const MeshSequence& mesh, double angle_per_frame) {
     set_frame(out, f, (frame_points(mesh, f) * turn.toRotationMatrix().transpose()).rowwise() + shift);
   }
   return out;
+}
+
+std::optional<std::filesystem::path> mesh_folder() {
+  const auto data = data_folder();
+  if (!data || !std::filesystem::exists(*data / "mesh")) return {};
+  return *data / "mesh";
 }
 
 }  // namespace kinespace::test

@@ -1,6 +1,9 @@
 // Small meshes whose properties are known.
 #pragma once
 
+#include <filesystem>
+#include <optional>
+
 #include "mesh/mesh_sequence.h"
 
 namespace kinespace::test {
@@ -16,5 +19,8 @@ namespace kinespace::test {
 [[nodiscard]] MeshSequence joined(const MeshSequence& a, const MeshSequence& b);
 // Every frame turned about an axis and moved, differently in each.
 [[nodiscard]] MeshSequence moved_rigidly(const MeshSequence& mesh, double angle_per_frame);
+
+// The mesh sequences of the shared data; nullopt where they are not.
+[[nodiscard]] std::optional<std::filesystem::path> mesh_folder();
 
 }  // namespace kinespace::test

@@ -1,14 +1,13 @@
-// Writes the fixtures that are missing: run it by hand for a new version of a format (fixtures/README.md).
-#include <gtest/gtest.h>
+// Writes the fixtures that are missing: run it for a new version of a format (fixtures/README.md).
+#include <filesystem>
+#include <span>
 
 #include "base/file.h"
 #include "tests/storage/sample_library.h"
 #include "tests/storage/sample_stream.h"
 
-namespace kinespace {
-namespace {
-
-TEST(Fixtures, DISABLED_write_missing) {
+int main() {
+  using namespace kinespace;
   const std::filesystem::path folder = KINESPACE_FIXTURES;
   if (!std::filesystem::exists(folder / "bitstream_v1.ksm")) {
     write_file_atomically(folder / "bitstream_v1.ksm", std::span<const std::byte>(test::sample_stream()));
@@ -18,6 +17,3 @@ TEST(Fixtures, DISABLED_write_missing) {
     test::fill_sample(library, 3, 40);
   }
 }
-
-}  // namespace
-}  // namespace kinespace
