@@ -20,22 +20,22 @@ namespace {
 constexpr int components = 7;  // velocity x y z, quaternion w x y z
 
 // The curves of each component, one a row.
-using Components = std::array<CurveMatrix, components>;
+using ComponentCurves = std::array<CurveMatrix, components>;
 
-std::vector<PreparedClip> load(const std::filesystem::path& folder) {
+std::vector<PreparedClip> load_clips(const std::filesystem::path& folder) {
   std::vector<PreparedClip> out;
   for (const auto& file : find_motion_files({folder})) out.push_back(prepare(read_clip(file)));
   return out;
 }
 
-Components collect(const std::vector<SampleMatrix>& samples) {
+ComponentCurves collect(const std::vector<SampleMatrix>& samples) {
   std::array<std::vector<Eigen::RowVectorXd>, components> rows;
   for (const SampleMatrix& s : samples) {
     for (Eigen::Index c = 0; c < s.cols(); ++c) {
       rows[static_cast<std::size_t>(CurveLayout::component(static_cast<int>(c)))].emplace_back(s.col(c).transpose());
     }
   }
-  Components out;
+  ComponentCurves out;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     out[k].resize(static_cast<Eigen::Index>(rows[k].size()), samples.front().rows());
     for (std::size_t i = 0; i < rows[k].size(); ++i) out[k].row(static_cast<Eigen::Index>(i)) = rows[k][i];
@@ -80,31 +80,31 @@ int functions_needed(const CurveMatrix& coefficients, Eigen::VectorXd energy, do
 }
 
 // All coefficients of the curves of one component, in the three bases.
-struct Coefficients {
+struct Expansions {
   std::array<CurveMatrix, 3> values;  // ours, Fourier, Legendre
   std::array<Eigen::VectorXd, 3> energy;
   double rms = 0;  // of the curves
 };
 
-Coefficients expand(const CurveMatrix& curves) {
+Expansions expand(const CurveMatrix& curves) {
   const int points = static_cast<int>(curves.cols());
   const AnalyticBasis fourier(AnalyticFamily::fourier, points, points);
   const AnalyticBasis legendre(AnalyticFamily::legendre, points, points);
   const FunctionalPca pca = fit_functional_pca(curves, {.variance_share = 1.0});
   const Eigen::VectorXd energy = curves.cwiseAbs2() * fourier.weights();
   const CurveMatrix centred = curves.rowwise() - pca.observed_mean.transpose();
-  Coefficients out;
+  Expansions out;
   out.values = {pca.scores(curves), fourier.coefficients(curves), legendre.coefficients(curves)};
   out.energy = {centred.cwiseAbs2() * fourier.weights(), energy, energy};
   out.rms = std::sqrt(energy.mean());
   return out;
 }
 
-void add_rows(const std::string& data, const Components& curves, bool bars, const std::vector<double>& tolerances,
+void add_rows(const std::string& data, const ComponentCurves& curves, bool bars, const std::vector<double>& tolerances,
               BenchReport& report) {
   std::vector<std::array<int, 3>> totals(tolerances.size(), {0, 0, 0});
   for (const CurveMatrix& component : curves) {
-    const Coefficients c = expand(component);
+    const Expansions c = expand(component);
     for (std::size_t t = 0; t < tolerances.size(); ++t) {
       for (std::size_t b = 0; b < 3; ++b)
         totals[t][b] += functions_needed(c.values[b], c.energy[b], tolerances[t] * c.rms);
@@ -129,7 +129,7 @@ void add_rows(const std::string& data, const Components& curves, bool bars, cons
 }  // namespace
 
 void basis_rows(const BenchOptions& options, BenchReport& report) {
-  const std::vector<PreparedClip> clips = load(options.data / "cmu");
+  const std::vector<PreparedClip> clips = load_clips(options.data / "cmu");
   add_rows("cmu 01-03, whole clips, 512 points", collect(whole_clips(clips, 512)), true, {0.05, 0.02, 0.01}, report);
   add_rows("cmu 01-03, 1 s sequences, 128 points", collect(sequences(clips, 128)), false, {0.05, 0.02, 0.01}, report);
 }

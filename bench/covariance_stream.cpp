@@ -12,6 +12,7 @@
 #include <oneapi/tbb/global_control.h>
 
 #include "base/error.h"
+#include "bench/timing.h"
 #include "kernels/covariance.h"
 
 extern "C" void dsyevd_(const char* job, const char* half, const int* n, double* a, const int* stride, double* values,
@@ -23,7 +24,7 @@ namespace {
 constexpr int kCurves = 1'000'000;
 constexpr int kPoints = 128;
 constexpr int kPart = 65'536;  // curves at a time: 32 MB
-constexpr int kRounds = 7;
+constexpr int kStreamRounds = 7;
 
 // Sums of four cosines with scores from a small generator, and noise.
 RowMatrix<float> make_curves() {
@@ -50,13 +51,6 @@ RowMatrix<float> make_curves() {
     }
   }
   return out;
-}
-
-template <typename Work>
-double seconds(const Work& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 // The largest eigenvalue; the matrix becomes the eigenvectors.
@@ -97,7 +91,7 @@ std::vector<BenchResult> bench_covariance_stream(const Compute& device) {
   double found = 0;  // so that no result is thrown away unseen
   const bool has_device = device.device_for(KernelFamily::dtw, never) != nullptr;
   // In turn, and the fastest of each: another process on the machine slows all of them.
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kStreamRounds; ++round) {
     const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
     bare = std::min(bare, seconds([&] {
                       cblas_ssyrk(CblasRowMajor, CblasLower, CblasTrans, kPoints, kCurves, 1, curves.data(), kPoints, 0,

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bench/report.h"
+#include "bench/timing.h"
 
 #include "base/error.h"
 #include "fpca/pose_features.h"
@@ -57,13 +58,6 @@ double cells(const FeatureSet& set, const std::vector<ClipPair>& pairs) {
   double sum = 0;
   for (const auto& pair : pairs) sum += static_cast<double>(set.rows(pair.query)) * set.rows(pair.target);
   return sum;
-}
-
-template <typename Work>
-double seconds(const Work& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 struct Case {

@@ -26,14 +26,14 @@ constexpr double step_s = 1.5;    // between the gaps of a clip
 constexpr double margin_s = 0.5;  // seen at least on either side
 constexpr std::array<double, 3> levels = {0.5, 0.8, 0.95};
 
-struct Data {
+struct Split {
   std::string name;
   std::vector<Clip> library;
   std::vector<Clip> held_out;
 };
 
-Data load(const std::filesystem::path& folder) {
-  Data out{.name = folder.filename().string(), .library = {}, .held_out = {}};
+Split load_split(const std::filesystem::path& folder) {
+  Split out{.name = folder.filename().string(), .library = {}, .held_out = {}};
   const auto files = find_motion_files({folder});
   std::vector<Clip> clips(files.size());
   tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = read_clip(files[i]); });
@@ -87,7 +87,7 @@ struct Coverage {
   }
 };
 
-void gap_rows(const FillModel& model, const Data& data, const PositionScale& scale, double gap_s, double bar,
+void gap_rows(const FillModel& model, const Split& data, const PositionScale& scale, double gap_s, double bar,
               BenchReport& report) {
   const std::vector<Cut> cuts = cuts_of(data.held_out, gap_s);
   FillingMeasures ours(scale);
@@ -128,7 +128,7 @@ void gap_rows(const FillModel& model, const Data& data, const PositionScale& sca
 }
 
 void data_rows(const std::filesystem::path& folder, BenchReport& report) {
-  const Data data = load(folder);
+  const Split data = load_split(folder);
   const PositionScale scale = position_scale(data.library);
   const auto start = std::chrono::steady_clock::now();
   const PreparedSource source{static_cast<int>(data.library.size()), [&](int i) {

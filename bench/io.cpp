@@ -54,7 +54,7 @@ void add_files(Corpus& corpus, const std::filesystem::path& folder) {
   }
 }
 
-Corpus load(const std::string& name, const std::vector<std::filesystem::path>& folders) {
+Corpus load_corpus(const std::string& name, const std::vector<std::filesystem::path>& folders) {
   Corpus corpus{.name = name};
   for (const auto& folder : folders) add_files(corpus, folder);
   std::ranges::sort(corpus.paths);
@@ -73,7 +73,7 @@ double now_s() {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-double seconds(const std::function<void()>& work) {
+double cpu_seconds(const std::function<void()>& work) {
   const double start = now_s();
   work();
   return now_s() - start;
@@ -99,14 +99,14 @@ void measure_speed(const Corpus& corpus, std::vector<BenchResult>& results) {
   double write_s = 0;
   const double parse_s = fastest(corpus.paths.size(), [&](std::size_t i) {
     Clip clip;
-    return seconds([&] { clip = corpus.parse(i); });
+    return cpu_seconds([&] { clip = corpus.parse(i); });
   });
   for (std::size_t i = 0; i < corpus.paths.size(); ++i) {
     const Clip clip = corpus.parse(i);
     frames += clip.frames;
-    positions_s += fastest(1, [&](std::size_t) { return seconds([&] { static_cast<void>(joint_positions(clip)); }); });
+    positions_s += fastest(1, [&](std::size_t) { return cpu_seconds([&] { static_cast<void>(joint_positions(clip)); }); });
     std::string text;
-    write_s += seconds([&] { text = format_bvh(clip); });
+    write_s += cpu_seconds([&] { text = format_bvh(clip); });
     written_mb += static_cast<double>(text.size()) / 1e6;
   }
   results.push_back({.name = "read " + kind + ", one core",
@@ -140,7 +140,7 @@ BenchResult linearity(const Corpus& corpus) {
   const auto time = [](const std::string& text) {
     double best = std::numeric_limits<double>::infinity();
     for (int pass = 0; pass < 2 * passes; ++pass) {
-      best = std::min(best, seconds([&] { static_cast<void>(parse_bvh(text, "repeated.bvh")); }));
+      best = std::min(best, cpu_seconds([&] { static_cast<void>(parse_bvh(text, "repeated.bvh")); }));
     }
     return best;
   };
@@ -201,8 +201,8 @@ void measure_loss(const Corpus& corpus, std::vector<BenchResult>& results) {
 
 BenchReport bench_io(const BenchOptions& options) {
   BenchReport report{.bench = "io", .device = "cpu", .threads = 1, .results = {}};
-  const Corpus bandai = load("bandai1+bandai2", {options.data / "bandai1", options.data / "bandai2"});
-  const Corpus cmu = load("cmu", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
+  const Corpus bandai = load_corpus("bandai1+bandai2", {options.data / "bandai1", options.data / "bandai2"});
+  const Corpus cmu = load_corpus("cmu", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
   for (const Corpus* corpus : {&bandai, &cmu}) {
     if (corpus->paths.empty()) {
       throw Error(ErrorKind::bad_input, {.file = options.data.string(),

@@ -11,7 +11,7 @@
 namespace kinespace {
 namespace {
 
-constexpr int kRounds = 3;
+constexpr int kKernelRounds = 3;
 
 std::string sizes_text(const KernelDescriptor& kernel) {
   std::string text;
@@ -25,7 +25,7 @@ std::string sizes_text(const KernelDescriptor& kernel) {
 void measure(const KernelDescriptor& kernel, const Compute& compute, const std::string& where, BenchReport& report) {
   double seconds = std::numeric_limits<double>::infinity();
   double error = 0;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kKernelRounds; ++round) {
     const auto result = kernel.compare(kernel.bench_sizes, compute, 1);
     seconds = std::min(seconds, result.kernel_seconds);
     error = std::max(error, result.error);

@@ -21,14 +21,14 @@
 namespace kinespace {
 namespace {
 
-struct Bar {
+struct MeshBar {
   double kg;
   std::optional<double> bpvf;
 };
 struct Sequence {
   std::string name;
-  std::vector<Bar> bars;      // of the standard profile
-  std::vector<Bar> of_paper;  // chen2019, its own runs, for the paper's profile
+  std::vector<MeshBar> bars;      // of the standard profile
+  std::vector<MeshBar> of_paper;  // chen2019, its own runs, for the paper's profile
 };
 const std::vector<Sequence>& sequences() {
   static const std::vector<Sequence> all{{"horse-gallop", {{1, 0.36}, {0.5, 0.50}, {0.2, 0.95}}, {{0.84, 0.96}}},
@@ -98,7 +98,7 @@ class MeshBench {
   }
 
   void standard(const Sequence& sequence, const MeshSequence& mesh) {
-    for (const Bar& bar : sequence.bars) {
+    for (const MeshBar& bar : sequence.bars) {
       const MeshPoint p = code_mesh("mesh-harmonics", mesh, {.kg = bar.kg}).point;
       add(fmt::format("rate at KG {} %", bar.kg), sequence.name, p.bpvf, "bpvf", bar.bpvf);
       add(fmt::format("encoding at KG {} %", bar.kg), sequence.name, p.encode_s, "s");
@@ -108,7 +108,7 @@ class MeshBench {
   }
 
   void pca(const Sequence& sequence, const MeshSequence& mesh) {
-    for (const Bar& bar : sequence.bars) {
+    for (const MeshBar& bar : sequence.bars) {
       const MeshPoint p = code_mesh("mesh-pca", mesh, {.kg = bar.kg}).point;
       add(fmt::format("mesh-pca at KG {} %", bar.kg), sequence.name, p.bpvf, "bpvf");
       note(sequence.name, "mesh-pca", p);
@@ -120,7 +120,7 @@ class MeshBench {
   }
 
   void paper(const Sequence& sequence, const MeshSequence& mesh) {
-    for (const Bar& bar : sequence.of_paper) {
+    for (const MeshBar& bar : sequence.of_paper) {
       const MeshPoint p = encode_only("mesh-harmonics", mesh, {.kg = bar.kg, .profile = MeshProfile::paper}).point;
       add(fmt::format("profile paper at KG {} %, as the paper's (bar: its rate)", bar.kg), sequence.name, p.bpvf,
           "bpvf", bar.bpvf);

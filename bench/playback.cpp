@@ -33,7 +33,7 @@ struct Played {
   std::vector<Player> players;
 };
 
-Played load(const std::filesystem::path& folder) {
+Played load_played(const std::filesystem::path& folder) {
   const auto files = find_motion_files({folder});
   std::vector<PreparedClip> clips(files.size());
   tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = prepare(read_clip(files[i])); });
@@ -102,7 +102,7 @@ double difference_cm(const Played& played, int functions) {
 }  // namespace
 
 BenchReport bench_playback(const BenchOptions& options) {
-  const Played played = load(options.data / "cmu");
+  const Played played = load_played(options.data / "cmu");
   const std::vector<Moment> moments = random_moments(played);
   BenchReport report{.bench = "playback", .device = "cpu", .threads = 1, .results = {}};
   const std::string data = fmt::format("cmu, {} rotating joints", played.players.front().joints());

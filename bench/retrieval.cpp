@@ -31,7 +31,7 @@ struct Labelled {
   std::vector<int> take;
 };
 
-Labelled load(const std::filesystem::path& folder) {
+Labelled load_labelled(const std::filesystem::path& folder) {
   const auto files = find_motion_files({folder});
   Labelled out;
   out.clips.resize(files.size());
@@ -163,9 +163,9 @@ std::size_t nearest_by_cost(const Labelled& data, const std::vector<float>& cost
   return best;
 }
 
-class Rows {
+class RetrievalRows {
  public:
-  explicit Rows(BenchReport& report) : report_(report) {}
+  explicit RetrievalRows(BenchReport& report) : report_(report) {}
   void add(const std::string& method, bool far, const Accuracy& a, const Accuracy* floor) {
     const std::string how = far ? ", far" : "";
     add_one(method + ", by content" + how, a.content,
@@ -186,7 +186,7 @@ class Rows {
 
 BenchReport bench_retrieval(const BenchOptions& options) {
   const Compute compute = Compute::open(options.device);
-  const Labelled data = load(options.data / "bandai2");
+  const Labelled data = load_labelled(options.data / "bandai2");
   OrientationMoments orientations(curve_layout(data.clips.front().skeleton).joint_count());
   for (const PreparedClip& clip : data.clips) orientations.add(clip.curves.values);
   const ClipSpace space = ClipSpace::build(source_of(data.clips), orientations.references());
@@ -197,7 +197,7 @@ BenchReport bench_retrieval(const BenchOptions& options) {
   const std::vector<float> costs = all_costs(keyframes_of(data), compute);
 
   BenchReport report{.bench = "retrieval", .device = compute.describe(), .threads = 2, .results = {}};
-  Rows rows(report);
+  RetrievalRows rows(report);
   for (const bool far : {false, true}) {
     const Accuracy l2 = accuracy(data, [&](std::size_t i) { return nearest_vector(data, plain, i, far); });
     const Accuracy dtw_all =

@@ -48,7 +48,7 @@ RowMatrix<float> all_vectors(const WindowSpace& space, const std::vector<WindowS
   return out;
 }
 
-Windows load(const std::filesystem::path& folder, const WindowOptions& options) {
+Windows load_windows(const std::filesystem::path& folder, const WindowOptions& options) {
   const auto files = find_motion_files({folder});
   std::vector<PreparedClip> clips(files.size());
   tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = prepare(read_clip(files[i])); });
@@ -109,7 +109,7 @@ void scan(const Windows& windows, int q, std::vector<std::pair<float, std::int64
 }
 
 // What nanoflann asks of a set of points.
-struct Points {
+struct SearchPoints {
   const RowMatrix<float>& rows;
   [[nodiscard]] std::size_t kdtree_get_point_count() const { return static_cast<std::size_t>(rows.rows()); }
   [[nodiscard]] float kdtree_get_pt(std::size_t i, std::size_t d) const {
@@ -120,7 +120,7 @@ struct Points {
     return false;
   }
 };
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Adaptor<float, Points>, Points, -1, std::int64_t>;
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Adaptor<float, SearchPoints>, SearchPoints, -1, std::int64_t>;
 
 void search_tree(const Tree& tree, const Windows& windows, int q) {
   std::vector<std::int64_t> ids(neighbours);
@@ -154,7 +154,7 @@ int different_lists(const Windows& windows, const VectorSearch& search) {
 }  // namespace
 
 BenchReport bench_search(const BenchOptions& options) {
-  const Windows windows = load(options.data / "bandai2", {});
+  const Windows windows = load_windows(options.data / "bandai2", {});
   BenchReport report{.bench = "search", .device = "cpu", .threads = 1, .results = {}};
   const std::string data = "bandai2, every 7th clip held out";
   const auto add = [&](const std::string& name, double value, const std::string& unit,
@@ -165,7 +165,7 @@ BenchReport bench_search(const BenchOptions& options) {
   add("windows of 1 s at stride 1", static_cast<double>(windows.searched.rows()), "windows");
   add("dimensions", static_cast<double>(windows.searched.cols()), "");
 
-  const Points points{windows.searched};
+  const SearchPoints points{windows.searched};
   Tree tree(static_cast<int>(windows.searched.cols()), points, nanoflann::KDTreeSingleIndexAdaptorParams(10));
   add("nanoflann, build", seconds_of([&] { tree.buildIndex(); }), "s");
   const auto start = std::chrono::steady_clock::now();

@@ -24,7 +24,7 @@ struct DataSet {
   std::vector<PreparedClip> prepared;
 };
 
-DataSet load(const std::string& name, const std::vector<std::filesystem::path>& folders) {
+DataSet load_data_set(const std::string& name, const std::vector<std::filesystem::path>& folders) {
   std::vector<std::filesystem::path> files;
   for (const auto& folder : folders) {
     if (!std::filesystem::is_directory(folder)) {
@@ -214,10 +214,10 @@ void alignment_rows(const DataSet& all, const Compute& compute, BenchReport& rep
 }  // namespace
 
 void space_rows(const BenchOptions& options, const Compute& compute, BenchReport& report) {
-  const DataSet bandai = load("bandai1+bandai2", {options.data / "bandai1", options.data / "bandai2"});
+  const DataSet bandai = load_data_set("bandai1+bandai2", {options.data / "bandai1", options.data / "bandai2"});
   level_of_detail_rows(bandai, {1.0, 0.25, 0.06}, compute, report);
   alignment_rows(bandai, compute, report);
-  const DataSet cmu = load("cmu 01-03", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
+  const DataSet cmu = load_data_set("cmu 01-03", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
   level_of_detail_rows(cmu, {0.75, 0.40, 0.10}, compute, report);
 }
 

@@ -114,7 +114,7 @@ void graph_rows(const std::string& data, LibraryView& view, BenchReport& report)
                             .unit = "clips"});
 }
 
-double median(std::vector<double> values) {
+double median_of(std::vector<double> values) {
   std::ranges::nth_element(values, values.begin() + std::ssize(values) / 2);
   return values[values.size() / 2];
 }
@@ -143,9 +143,9 @@ void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) 
   const auto row = [&](const char* name, double value, double bar) {
     report.results.push_back({.name = name, .data = data, .value = value, .unit = "x", .bar = bar});
   };
-  row("seam: largest joint speed over the usual, median of 200 random pairs", median(speed), 1);
+  row("seam: largest joint speed over the usual, median_of of 200 random pairs", median_of(speed), 1);
   row("seam: the same, worst", std::ranges::max(speed), 2);
-  row("seam: largest joint acceleration over the usual, median of 200 random pairs", median(acceleration), 1);
+  row("seam: largest joint acceleration over the usual, median_of of 200 random pairs", median_of(acceleration), 1);
   row("seam: the same, worst", std::ranges::max(acceleration), 2);
 }
 
@@ -159,9 +159,9 @@ void path_rows(const std::string& data, LibraryView& view, BenchReport& report) 
     if (!plan) continue;
     for (const Join& join : plan->transition.joins) ratios.push_back(join.ratios.worst());
   }
-  report.results.push_back({.name = "seam: speed or acceleration, median of the seams of 60 ways through the graph",
+  report.results.push_back({.name = "seam: speed or acceleration, median_of of the seams of 60 ways through the graph",
                             .data = data,
-                            .value = median(ratios),
+                            .value = median_of(ratios),
                             .unit = "x",
                             .bar = 1});
   report.results.push_back(

@@ -91,7 +91,7 @@ void print(const Json& result, bool json) {
   json ? print_json(result) : print_fields(result);
 }
 
-struct EncodeOptions {
+struct MeshEncodeOptions {
   fs::path input;
   fs::path output;
   std::string codec = "mesh-harmonics";
@@ -102,7 +102,7 @@ struct EncodeOptions {
   bool json = false;
 };
 
-void run_encode(EncodeOptions& options, Session& session) {
+void run_encode(MeshEncodeOptions& options, Session& session) {
   require_different_files(options.input, options.output);
   const MeshSequence mesh = read_mesh_sequence(options.input, options.rate_hz);
   options.codec_options.profile = options.profile == "paper" ? MeshProfile::paper : MeshProfile::standard;
@@ -119,7 +119,7 @@ void run_encode(EncodeOptions& options, Session& session) {
   print(result, options.json);
 }
 
-struct DecodeOptions {
+struct MeshDecodeOptions {
   fs::path stream;
   fs::path output;
   std::optional<int> from, to;
@@ -135,7 +135,7 @@ MeshFormat format_of(const fs::path& output, const std::string& format) {
   return MeshFormat::numpy;
 }
 
-void run_decode(const DecodeOptions& options, const std::string& format, Session& session) {
+void run_decode(const MeshDecodeOptions& options, const std::string& format, Session& session) {
   require_different_files(options.stream, options.output);
   const MappedFile file(options.stream);
   const auto start = Clock::now();
@@ -160,7 +160,7 @@ void run_decode(const DecodeOptions& options, const std::string& format, Session
         options.json);
 }
 
-struct CompareOptions {
+struct MeshCompareOptions {
   fs::path reference, other;
   std::optional<fs::path> picture;
   std::optional<int> frame;
@@ -183,7 +183,7 @@ int worst_frame(const MeshSequence& a, const MeshSequence& b) {
   return worst;
 }
 
-void run_compare(const CompareOptions& options, Session& session) {
+void run_compare(const MeshCompareOptions& options, Session& session) {
   const MeshSequence a = read_any(options.reference, options.library, session);
   Session::check_stop();
   const MeshSequence b = read_any(options.other, options.library, session);
@@ -219,7 +219,7 @@ void run_compare(const CompareOptions& options, Session& session) {
   print(result, options.json);
 }
 
-struct InfoOptions {
+struct MeshInfoOptions {
   fs::path file;
   bool json = false;
 };
@@ -245,7 +245,7 @@ Json describe_sequence(const fs::path& path) {
           {"isolated_vertices", found.isolated_vertices}};
 }
 
-void run_info(const InfoOptions& options) {
+void run_info(const MeshInfoOptions& options) {
   if (!is_stream_file(options.file)) return print(describe_sequence(options.file), options.json);
   const MappedFile file(options.file);
   const auto reader = open_mesh_stream(file.bytes(), options.file.string());
@@ -257,7 +257,7 @@ void run_info(const InfoOptions& options) {
 
 void add_mesh_encode(CLI::App& mesh, Session& session) {
   CLI::App* command = mesh.add_subcommand("encode", "A mesh sequence as a stream (.ksm)");
-  const auto options = std::make_shared<EncodeOptions>();
+  const auto options = std::make_shared<MeshEncodeOptions>();
   MeshCodecOptions& codec = options->codec_options;
   command->add_option("IN", options->input, "A folder of OBJ, PLY or NumPy files, or a .glb or .gltf file")->required();
   command->add_option("-o,--output", options->output, "The stream to write")->required();
@@ -282,7 +282,7 @@ void add_mesh_encode(CLI::App& mesh, Session& session) {
 
 void add_mesh_decode(CLI::App& mesh, Session& session) {
   CLI::App* command = mesh.add_subcommand("decode", "Frames out of a stream, all or some");
-  const auto options = std::make_shared<DecodeOptions>();
+  const auto options = std::make_shared<MeshDecodeOptions>();
   const auto format = std::make_shared<std::string>("npy");
   command->add_option("IN", options->stream, "The stream (.ksm)")->required();
   command->add_option("-o,--output", options->output, "A folder, or a .glb or .gltf file")->required();
@@ -298,7 +298,7 @@ void add_mesh_decode(CLI::App& mesh, Session& session) {
 
 void add_mesh_compare(CLI::App& mesh, Session& session) {
   CLI::App* command = mesh.add_subcommand("compare", "How far mesh sequence B is from the reference A");
-  const auto options = std::make_shared<CompareOptions>();
+  const auto options = std::make_shared<MeshCompareOptions>();
   command->add_option("A", options->reference, "The reference: files or a stream")->required();
   command->add_option("B", options->other, "The sequence to judge: files or a stream")->required();
   command->add_option("--picture", options->picture, "Draw original, decoded and error (blue to red) to this PNG");
@@ -310,7 +310,7 @@ void add_mesh_compare(CLI::App& mesh, Session& session) {
 
 void add_mesh_info(CLI::App& mesh) {
   CLI::App* command = mesh.add_subcommand("info", "What a mesh sequence or a stream of one holds");
-  const auto options = std::make_shared<InfoOptions>();
+  const auto options = std::make_shared<MeshInfoOptions>();
   command->add_option("FILE", options->file, "Files of a sequence, or a stream")->required();
   command->add_flag("--json", options->json, "Print the result as one JSON object");
   command->callback([options] { run_info(*options); });

@@ -5,12 +5,11 @@
 #include <limits>
 #include <vector>
 
+#include "motion/error_measures.h"
 #include "motion/kinematics.h"
 
 namespace kinespace {
 namespace {
-
-constexpr double shell_cm = 3;
 
 // A double as a float that is not less.
 double rounded_up(double value) {

@@ -22,7 +22,7 @@
 namespace kinespace {
 namespace {
 
-constexpr std::array codec_settings{
+constexpr std::array clip_pca_settings{
     CodecSetting{"variance", 95, 30, 100, "percent of variance that the axes keep, where no target is given"},
     CodecSetting{"contacts", 1, 0, 1, "1: joints on the ground are kept apart and put there by inverse kinematics"},
 };
@@ -185,7 +185,7 @@ class ClipPcaReader final : public MarkerReader {
 }  // namespace
 
 std::span<const CodecSetting> ClipPcaCodec::settings() const {
-  return codec_settings;
+  return clip_pca_settings;
 }
 
 Bytes ClipPcaCodec::encode(std::span<const Clip> clips, const CodecOptions& options) const {

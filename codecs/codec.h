@@ -37,6 +37,11 @@ struct CodecTarget {
   void validate() const;
 };
 
+// Throws the Error{usage} of a codec that cannot keep to its target: "a target that cannot be met: FOUND, expected
+// EXPECTED".
+[[noreturn]] void cannot_meet(const std::string& found, std::string expected);
+[[noreturn]] void cannot_meet(const CodecTarget& target);
+
 // A number that a codec can be set by.
 struct CodecSetting {
   std::string_view name;

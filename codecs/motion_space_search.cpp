@@ -17,10 +17,6 @@ double step_for(double mean_error_cm) {
   return 7 * mean_error_cm;
 }
 
-[[noreturn]] void cannot_meet(std::string found, std::string expected) {
-  throw Error(ErrorKind::usage, {.found = "a target that cannot be met: " + found, .expected = std::move(expected)});
-}
-
 }  // namespace
 
 MotionSpaceSearch::MotionSpaceSearch(std::span<const Clip> clips, const Progress& progress,

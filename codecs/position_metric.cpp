@@ -4,11 +4,10 @@
 #include <vector>
 
 #include "codecs/natural_functions.h"
+#include "motion/error_measures.h"
 
 namespace kinespace {
 namespace {
-
-constexpr double shell_cm = 3;
 
 using Rotation = Eigen::Matrix3d;
 

@@ -169,10 +169,6 @@ class QbcEncoder {
   std::vector<std::pair<std::size_t, std::size_t>> curves_;  // clip, joint
 };
 
-[[noreturn]] void cannot_meet(std::string found, std::string expected) {
-  throw Error(ErrorKind::usage, {.found = "a target that cannot be met: " + found, .expected = std::move(expected)});
-}
-
 // The largest limit whose stream keeps an error, or the smallest whose stream keeps to a size.
 class LimitSearch {
  public:

@@ -56,6 +56,18 @@ void check_clips(std::span<const Clip> clips) {
 
 }  // namespace
 
+void cannot_meet(const std::string& found, std::string expected) {
+  throw Error(ErrorKind::usage, {.found = "a target that cannot be met: " + found, .expected = std::move(expected)});
+}
+
+void cannot_meet(const CodecTarget& target) {
+  std::string found;
+  if (target.mean_error_cm) found = fmt::format("a mean joint error of {} cm", *target.mean_error_cm);
+  if (target.max_error_cm) found = fmt::format("a largest joint error of {} cm", *target.max_error_cm);
+  if (target.bytes) found = fmt::format("{} bytes", *target.bytes);
+  cannot_meet(found, target.bytes ? "more; tables and names alone take that" : "a larger one");
+}
+
 void CodecTarget::validate() const {
   if (mean_error_cm) require_positive("mean_error_cm", *mean_error_cm);
   if (max_error_cm) require_positive("max_error_cm", *max_error_cm);

@@ -26,7 +26,7 @@ double cadence_of(const RunOptions& options) {
   return options.cadence_per_min.value_or(usual / std::sqrt(size_of(options.take)));
 }
 
-double mix(double slow, double fast, double pace) {
+double at_pace(double slow, double fast, double pace) {
   return slow + (fast - slow) * pace;
 }
 
@@ -38,19 +38,19 @@ Gait gait_of(const RunOptions& options, const Build& build) {
                .turn_rate = options.turn_rate_deg_s * degree};
   gait.stride_s = 120 / cadence_of(options);
   gait.phase = options.start_phase;
-  gait.toe_off = mix(0.32, 0.22, pace);
+  gait.toe_off = at_pace(0.32, 0.22, pace);
   gait.flat = 0.05;
   gait.heel_off = gait.flat + 0.4 * (gait.toe_off - gait.flat);
   gait.under = 0.42 * gait.toe_off;
   gait.half_width = 0.35 * build.left_hip.x();
   gait.toe_out = 5 * degree;
   gait.strike_pitch = -6 * degree;
-  gait.swing = {.lift = size_of(options.take) * mix(7, 19, pace),
+  gait.swing = {.lift = size_of(options.take) * at_pace(7, 19, pace),
                 .rise = 3,
                 .fall = 4.5,
                 .in = 0.45,
                 .out = 0.4,
-                .peak_pitch = mix(64, 92, pace) * degree,
+                .peak_pitch = at_pace(64, 92, pace) * degree,
                 .peak_after = 0.22,
                 .pitch_ready = 0.85,
                 .flight = 0};
@@ -72,13 +72,13 @@ double bounce(double t, double step_s, double stance_s) {
 }
 
 void swing_arms(BodyPose& pose, const RunOptions& options, double cycle, double pace) {
-  const double amplitude = options.arm_swing * mix(24, 40, pace) * degree;
+  const double amplitude = options.arm_swing * at_pace(24, 40, pace) * degree;
   for (std::size_t side = 0; side < 2; ++side) {
     const double forward = -(side == 0 ? 1 : -1) * std::cos(cycle);
     pose.arms[side] = {.flexion = -8 * degree + amplitude * forward,
                        .abduction = 13 * degree,
                        .twist = -18 * degree,
-                       .elbow = mix(78, 92, pace) * degree + 0.25 * amplitude * forward,
+                       .elbow = at_pace(78, 92, pace) * degree + 0.25 * amplitude * forward,
                        .lift = 2 * degree,
                        .wrist = 5 * degree};
   }
@@ -96,13 +96,13 @@ BodyPose body_at(double t, const RunOptions& options, const Gait& gait) {
   const Eigen::Vector2d place = gait.path.beside(t, 0, sway);
   pose.hips = {place.x(), bounce(step_time, step_s, gait.toe_off * gait.stride_s), place.y()};
   pose.heading = gait.path.heading_at(t);
-  pose.pelvis = {.yaw = -mix(5, 10, pace) * degree * std::cos(cycle),
-                 .pitch = mix(4, 8, pace) * degree,
+  pose.pelvis = {.yaw = -at_pace(5, 10, pace) * degree * std::cos(cycle),
+                 .pitch = at_pace(4, 8, pace) * degree,
                  .roll = 3 * degree * std::cos(gait.angle(t) - pi * gait.toe_off) - bank};
-  const double chest_yaw = mix(5, 9, pace) * degree * std::cos(cycle) * std::min(1.0, options.arm_swing);
+  const double chest_yaw = at_pace(5, 9, pace) * degree * std::cos(cycle) * std::min(1.0, options.arm_swing);
   pose.spine = {
-      .yaw = chest_yaw - pose.pelvis.yaw, .pitch = mix(3, 7, pace) * degree, .roll = -0.9 * (pose.pelvis.roll + bank)};
-  pose.head = {.yaw = -chest_yaw, .pitch = -mix(5, 11, pace) * degree, .roll = 0.5 * bank};
+      .yaw = chest_yaw - pose.pelvis.yaw, .pitch = at_pace(3, 7, pace) * degree, .roll = -0.9 * (pose.pelvis.roll + bank)};
+  pose.head = {.yaw = -chest_yaw, .pitch = -at_pace(5, 11, pace) * degree, .roll = 0.5 * bank};
   swing_arms(pose, options, cycle, pace);
   return pose;
 }

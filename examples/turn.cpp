@@ -11,7 +11,7 @@ namespace {
 using namespace samples;
 using Eigen::Vector2d;
 
-constexpr double before_s = 0.4;
+constexpr double standing_s = 0.4;
 
 // The foot of the turn's side opens, the other closes, as often as needed.
 class TurnPlan {
@@ -24,8 +24,8 @@ class TurnPlan {
         pairs_(static_cast<int>(std::ceil(options.angle_deg / 75))),
         leading_(options.side == Side::left ? 0 : 1) {}
 
-  [[nodiscard]] double steps_end() const { return before_s + 2 * pairs_ * step_s_; }
-  [[nodiscard]] double duration_s() const { return steps_end() + before_s; }
+  [[nodiscard]] double steps_end() const { return standing_s + 2 * pairs_ * step_s_; }
+  [[nodiscard]] double duration_s() const { return steps_end() + standing_s; }
 
   [[nodiscard]] FootTrack foot(int side) const {
     std::vector<Plant> plants;
@@ -53,16 +53,16 @@ class TurnPlan {
 
   // Of the body: it starts before the first foot is off and ends after the last one stands.
   [[nodiscard]] double heading_at(double t) const {
-    const double start = before_s - 0.3 * step_s_;
+    const double start = standing_s - 0.3 * step_s_;
     return heading_ + angle_ * travel((t - start) / (steps_end() - start), 0.35, 0.35);
   }
 
   // The share of the weight on the left foot.
   [[nodiscard]] double weight_left(double t) const {
-    std::vector<Keys::Key> keys{{before_s - 0.5 * step_s_, 0.5}};
+    std::vector<Keys::Key> keys{{standing_s - 0.5 * step_s_, 0.5}};
     for (int i = 0; i < 2 * pairs_; ++i) {
       const bool left_swings = (i % 2 == 0) == (leading_ == 0);
-      keys.push_back({before_s + (i + 0.4) * step_s_, left_swings ? 0.2 : 0.8});
+      keys.push_back({standing_s + (i + 0.4) * step_s_, left_swings ? 0.2 : 0.8});
     }
     keys.push_back({steps_end() + 0.35 * step_s_, 0.5});
     return Keys(keys)(t);
@@ -70,7 +70,7 @@ class TurnPlan {
 
  private:
   [[nodiscard]] double lift_time(int side, int k) const {
-    return before_s + (2 * k + (side == leading_ ? 0 : 1)) * step_s_;
+    return standing_s + (2 * k + (side == leading_ ? 0 : 1)) * step_s_;
   }
 
   Build build_;

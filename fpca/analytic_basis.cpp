@@ -63,7 +63,7 @@ void add_polynomials(const Eigen::ArrayXd& u, const Eigen::ArrayXd& root, Orthon
   }
 }
 
-void require_points(Eigen::Index found, Eigen::Index expected) {
+void require_columns(Eigen::Index found, Eigen::Index expected) {
   if (found == expected) return;
   throw Error(ErrorKind::usage, {.found = std::to_string(found) + " columns", .expected = std::to_string(expected)});
 }
@@ -86,12 +86,12 @@ AnalyticBasis::AnalyticBasis(AnalyticFamily family, int points, int count, Domai
 }
 
 CurveMatrix AnalyticBasis::coefficients(const CurveView& curves) const {
-  require_points(curves.cols(), weights_.size());
+  require_columns(curves.cols(), weights_.size());
   return curves * (weights_.asDiagonal() * functions_);
 }
 
 CurveMatrix AnalyticBasis::reconstruct(const CurveView& coefficients) const {
-  if (coefficients.cols() > functions_.cols()) require_points(coefficients.cols(), functions_.cols());
+  if (coefficients.cols() > functions_.cols()) require_columns(coefficients.cols(), functions_.cols());
   return coefficients * functions_.leftCols(coefficients.cols()).transpose();
 }
 

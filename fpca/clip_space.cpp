@@ -14,7 +14,7 @@ namespace kinespace {
 namespace {
 
 constexpr int clip_points = 64;
-constexpr int clips_per_block = 64;
+constexpr int clips_per_visit = 64;
 
 // T x C of the whole clip, breaks and all, velocity in metres per clip.
 SampleMatrix clip_samples(const MotionSpace& space, const ClipCurves& curves) {
@@ -38,10 +38,10 @@ std::vector<SampleMatrix> block_samples(const PreparedSource& clips, const Motio
 template <typename Visit>
 void for_each_block(const PreparedSource& clips, const MotionSpace& space, const Progress& progress,
                     const Visit& visit) {
-  for (int start = 0; start < clips.count; start += clips_per_block) {
+  for (int start = 0; start < clips.count; start += clips_per_visit) {
     progress.check_stop();
     progress.at("index", static_cast<double>(start) / clips.count);
-    visit(block_samples(clips, space, start, std::min(clips_per_block, clips.count - start)));
+    visit(block_samples(clips, space, start, std::min(clips_per_visit, clips.count - start)));
   }
 }
 

@@ -12,7 +12,7 @@
 namespace kinespace {
 namespace {
 
-void require(bool legal, const char* field, double value, const char* range) {
+void require_option(bool legal, const char* field, double value, const char* range) {
   if (legal) return;
   throw Error(ErrorKind::usage, {.found = fmt::format("SequenceOptions::{} = {}", field, value), .expected = range});
 }
@@ -148,12 +148,12 @@ Run cut_run(const Movement& movement, int first, int last, double rate_hz, const
 }  // namespace
 
 void SequenceOptions::validate() const {
-  require(shortest_s > 0, "shortest_s", shortest_s, "seconds above 0");
-  require(longest_s > shortest_s && std::isfinite(longest_s), "longest_s", longest_s, "seconds above shortest_s");
-  require(length_weight >= 0, "length_weight", length_weight, "0 or more");
-  require(jerk_weight >= 0, "jerk_weight", jerk_weight, "0 or more");
-  require(break_cm > 0, "break_cm", break_cm, "centimetres above 0");
-  require(break_ratio > 1, "break_ratio", break_ratio, "more than 1");
+  require_option(shortest_s > 0, "shortest_s", shortest_s, "seconds above 0");
+  require_option(longest_s > shortest_s && std::isfinite(longest_s), "longest_s", longest_s, "seconds above shortest_s");
+  require_option(length_weight >= 0, "length_weight", length_weight, "0 or more");
+  require_option(jerk_weight >= 0, "jerk_weight", jerk_weight, "0 or more");
+  require_option(break_cm > 0, "break_cm", break_cm, "centimetres above 0");
+  require_option(break_ratio > 1, "break_ratio", break_ratio, "more than 1");
 }
 
 std::vector<Run> cut_sequences(const Clip& clip, const SequenceOptions& options) {

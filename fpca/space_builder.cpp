@@ -14,7 +14,7 @@
 namespace kinespace {
 namespace {
 
-constexpr int clips_per_block = 16;  // fixed, so that sums do not depend on threads
+constexpr int clips_per_sum = 16;  // fixed, so that sums do not depend on threads
 
 // Loads every clip once, block by block and the clips of a block in parallel, and hands each to `work` (in parallel)
 // and then to `gather` (one at a time, in order).
@@ -22,10 +22,10 @@ template <typename Result>
 void for_each_clip(const PreparedSource& clips, const Progress& progress, std::string_view stage,
                    const std::function<Result(int, const PreparedClip&)>& work,
                    const std::function<void(int, Result&)>& gather) {
-  for (int start = 0; start < clips.count; start += clips_per_block) {
+  for (int start = 0; start < clips.count; start += clips_per_sum) {
     progress.check_stop();
     progress.at(stage, static_cast<double>(start) / clips.count);
-    const int count = std::min(clips_per_block, clips.count - start);
+    const int count = std::min(clips_per_sum, clips.count - start);
     std::vector<std::optional<Result>> results(static_cast<std::size_t>(count));
     tbb::parallel_for(0, count, [&](int i) {
       const PreparedClip clip = clips.load(start + i);

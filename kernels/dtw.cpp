@@ -9,7 +9,7 @@
 namespace kinespace {
 namespace {
 
-[[noreturn]] void misuse(std::string found, std::string expected) {
+[[noreturn]] void dtw_misuse(std::string found, std::string expected) {
   throw Error(ErrorKind::usage, {.found = std::move(found), .expected = std::move(expected)});
 }
 
@@ -38,7 +38,7 @@ class ClipCheck {
   ClipCheck(const FeatureSet& set, const char* what) : set_(set), what_(what), seen_(set.clips(), false) {}
   void operator()(int clip) {
     if (clip < 0 || clip >= set_.clips()) {
-      misuse(std::string(what_) + " " + std::to_string(clip), "0 to " + std::to_string(set_.clips() - 1));
+      dtw_misuse(std::string(what_) + " " + std::to_string(clip), "0 to " + std::to_string(set_.clips() - 1));
     }
     if (!seen_[clip]) require_finite(set_, clip, what_);
     seen_[clip] = true;
@@ -56,7 +56,7 @@ void check(const FeatureSet& queries, const FeatureSet& targets, std::span<const
   queries.validate();
   targets.validate();
   if (queries.dims != targets.dims) {
-    misuse("queries of " + std::to_string(queries.dims) + " features and targets of " + std::to_string(targets.dims),
+    dtw_misuse("queries of " + std::to_string(queries.dims) + " features and targets of " + std::to_string(targets.dims),
            "the same features");
   }
   ClipCheck query(queries, "query");
@@ -96,32 +96,32 @@ std::span<const float> FeatureSet::clip(int clip) const {
 
 void FeatureSet::add(std::span<const float> rows) {
   if (dims < 1 || rows.size() % static_cast<std::size_t>(dims) != 0) {
-    misuse(std::to_string(rows.size()) + " numbers of " + std::to_string(dims) + " features", "whole rows");
+    dtw_misuse(std::to_string(rows.size()) + " numbers of " + std::to_string(dims) + " features", "whole rows");
   }
   values.insert(values.end(), rows.begin(), rows.end());
   starts.push_back(starts.back() + static_cast<std::int64_t>(rows.size()) / dims);
 }
 
 void FeatureSet::validate() const {
-  if (dims < 1) misuse("dims " + std::to_string(dims), "dims >= 1");
+  if (dims < 1) dtw_misuse("dims " + std::to_string(dims), "dims >= 1");
   if (starts.empty() || starts.front() != 0 || !std::is_sorted(starts.begin(), starts.end())) {
-    misuse("starts that do not rise from 0", "the first row of each clip, and the number of rows");
+    dtw_misuse("starts that do not rise from 0", "the first row of each clip, and the number of rows");
   }
   if (static_cast<std::size_t>(starts.back()) * static_cast<std::size_t>(dims) != values.size()) {
-    misuse(std::to_string(values.size()) + " values",
+    dtw_misuse(std::to_string(values.size()) + " values",
            std::to_string(starts.back()) + " rows of " + std::to_string(dims) + " features");
   }
   for (int c = 0; c < clips(); ++c) {
-    if (starts[c + 1] - starts[c] > std::int64_t{1} << 30) misuse("a clip of over 2^30 rows", "shorter clips");
+    if (starts[c + 1] - starts[c] > std::int64_t{1} << 30) dtw_misuse("a clip of over 2^30 rows", "shorter clips");
   }
 }
 
 void DtwOptions::validate() const {
   if (!(band_fraction >= 0 && band_fraction <= 1)) {
-    misuse("band_fraction " + std::to_string(band_fraction), "0 (no band) to 1");
+    dtw_misuse("band_fraction " + std::to_string(band_fraction), "0 (no band) to 1");
   }
   if (path_memory_bytes < (1U << 20)) {
-    misuse("path_memory_bytes " + std::to_string(path_memory_bytes), "1 MiB or more");
+    dtw_misuse("path_memory_bytes " + std::to_string(path_memory_bytes), "1 MiB or more");
   }
 }
 

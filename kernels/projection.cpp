@@ -13,7 +13,7 @@
 namespace kinespace {
 namespace {
 
-constexpr Eigen::Index kBlockRows = 256;
+constexpr Eigen::Index kProjectionRows = 256;
 template <typename T>
 using Vector = Eigen::Matrix<T, Eigen::Dynamic, 1>;
 
@@ -45,9 +45,9 @@ void gemm(Eigen::Index n, Eigen::Index m, Eigen::Index k, const T* a, Eigen::Ind
 template <typename Body>
 void for_row_blocks(Eigen::Index rows, const Body& body) {
   use_single_threaded_blas();
-  tbb::parallel_for(Eigen::Index{0}, (rows + kBlockRows - 1) / kBlockRows, [&](Eigen::Index block) {
-    const Eigen::Index first = block * kBlockRows;
-    body(first, std::min(kBlockRows, rows - first));
+  tbb::parallel_for(Eigen::Index{0}, (rows + kProjectionRows - 1) / kProjectionRows, [&](Eigen::Index block) {
+    const Eigen::Index first = block * kProjectionRows;
+    body(first, std::min(kProjectionRows, rows - first));
   });
 }
 

@@ -33,7 +33,7 @@ Eigen::Vector3d doubled_area_vector(const Corners& t) {
   return (t.col(1) - t.col(0)).cross(t.col(2) - t.col(0));
 }
 
-bool degenerate(const Corners& t) {
+bool degenerate_corners(const Corners& t) {
   return !(doubled_area_vector(t).norm() > degenerate_below * longest_edge_squared(t));
 }
 
@@ -107,7 +107,7 @@ void DetailTransfer::prepare_poisson() {
     const Eigen::Vector3d normal = doubled_area_vector(p);
     // As the stiffness has it: a flat triangle counts as one of the area that cotangent_flatness gives it.
     const double doubled = std::max(normal.norm(), cotangent_flatness * longest_edge_squared(p));
-    Element element{Eigen::Matrix<double, 3, 2>::Zero(), degenerate(corners(key_low_, t))};
+    Element element{Eigen::Matrix<double, 3, 2>::Zero(), degenerate_corners(corners(key_low_, t))};
     if (normal.norm() > 0) {
       // The gradient of a hat function is the opposite edge turned by a right angle, over twice the area.
       const Eigen::Vector3d n = normal.normalized();

@@ -11,11 +11,7 @@
 namespace kinespace {
 namespace {
 
-bool degenerate(const Triangle& t) {
-  return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
-}
-
-std::array<Eigen::Vector3d, 3> corners(const Points& points, const Triangle& t) {
+std::array<Eigen::Vector3d, 3> corners_of(const Points& points, const Triangle& t) {
   return {points.row(t[0]), points.row(t[1]), points.row(t[2])};
 }
 
@@ -43,7 +39,7 @@ SparseMatrix cotangent_stiffness(const Points& points, std::span<const Triangle>
   entries.reserve(triangles.size() * 12 + static_cast<std::size_t>(points.rows()));
   for (const Triangle& t : triangles) {
     if (degenerate(t)) continue;
-    const auto p = corners(points, t);
+    const auto p = corners_of(points, t);
     const double longest =
         std::max({(p[1] - p[0]).squaredNorm(), (p[2] - p[1]).squaredNorm(), (p[0] - p[2]).squaredNorm()});
     const double doubled_area = std::max((p[1] - p[0]).cross(p[2] - p[0]).norm(), flatness * longest);
@@ -73,7 +69,7 @@ Eigen::VectorXd lumped_mass(const Points& points, std::span<const Triangle> tria
   double total = 0;
   for (const Triangle& t : triangles) {
     if (degenerate(t)) continue;
-    const auto p = corners(points, t);
+    const auto p = corners_of(points, t);
     const double area = 0.5 * (p[1] - p[0]).cross(p[2] - p[0]).norm();
     for (const std::int32_t v : t) mass[v] += area / 3;
     total += area;

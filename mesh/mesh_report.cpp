@@ -10,10 +10,6 @@
 namespace kinespace {
 namespace {
 
-bool degenerate(const Triangle& t) {
-  return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
-}
-
 // The triangles that make the surface: neither degenerate nor there before.
 std::vector<Triangle> surface(const MeshSequence& mesh, MeshReport& out) {
   struct Key {

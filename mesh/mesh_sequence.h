@@ -18,6 +18,10 @@
 namespace kinespace {
 
 using Triangle = std::array<std::int32_t, 3>;
+// Whether a vertex stands in it twice.
+[[nodiscard]] inline bool degenerate(const Triangle& t) {
+  return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+}
 
 // One frame as a matrix, a row a vertex; stored by columns, so that x, y and z are right-hand sides of linear systems.
 using Points = Eigen::Matrix<double, Eigen::Dynamic, 3>;

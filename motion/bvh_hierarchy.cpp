@@ -14,9 +14,9 @@ constexpr std::size_t deepest = 1000;
 constexpr int end_site_level = -1;
 
 // Words, where a brace is a word of its own.
-class Words {
+class HierarchyWords {
  public:
-  explicit Words(const TextSource& source) : source_(source), at_(source.begin()), end_(source.end()) {
+  explicit HierarchyWords(const TextSource& source) : source_(source), at_(source.begin()), end_(source.end()) {
     constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
     if (std::string_view(at_, source.size()).starts_with(byte_order_mark)) at_ += byte_order_mark.size();
   }
@@ -90,7 +90,7 @@ class Words {
 
 class Hierarchy {
  public:
-  explicit Hierarchy(Words& words) : words_(words) {}
+  explicit Hierarchy(HierarchyWords& words) : words_(words) {}
 
   Skeleton parse() && {
     words_.require("HIERARCHY", "HIERARCHY, the first word of a BVH file", "check that this is a BVH file");
@@ -177,7 +177,7 @@ class Hierarchy {
     }
   }
 
-  Words& words_;
+  HierarchyWords& words_;
   std::vector<Joint> joints_;
   std::vector<bool> has_offset_;
   std::vector<int> levels_;  // open braces, outermost first
@@ -197,7 +197,7 @@ double rate_of(double frame_time) {
 }
 
 // "Frames:" and "Time:", with or without space around the colon.
-void require_label(Words& words, std::string_view label, const std::string& expected) {
+void require_label(HierarchyWords& words, std::string_view label, const std::string& expected) {
   const auto word = words.peek();
   if (same_word(word, label)) {
     words.skip(word);
@@ -212,7 +212,7 @@ void require_label(Words& words, std::string_view label, const std::string& expe
 }  // namespace
 
 BvhHeader parse_bvh_header(const TextSource& source) {
-  Words words(source);
+  HierarchyWords words(source);
   BvhHeader header{.skeleton = Hierarchy(words).parse()};
   drop_inner_end_sites(header.skeleton);
   if (same_word(words.peek(), "ROOT")) words.fail("one ROOT", "keep one skeleton a file");

@@ -17,7 +17,6 @@
 namespace kinespace {
 namespace {
 
-constexpr double shell_cm = 3;
 
 struct Pair {
   int a = 0;

@@ -5,6 +5,9 @@
 
 namespace kinespace {
 
+// How far from a joint, along its axes, the points stand by which the shell error sees turns.
+inline constexpr double shell_cm = 3;
+
 // `a` is the reference. Joints are matched by name; only joints that both have count, end sites never do.
 struct MotionError {
   int joints = 0;

@@ -8,10 +8,10 @@
 namespace kinespace {
 namespace {
 
-constexpr int block = 32;  // frames; the world frames of a skeleton at a block's frames stay in the second-level cache
+constexpr int frame_block = 32;  // frames; the world frames of a skeleton at a block's frames stay in the second-level cache
 
 // One number of one joint at the frames of a block.
-using Lane = std::array<double, block>;
+using Lane = std::array<double, frame_block>;
 
 struct WorldBlock {
   alignas(64) Lane w, x, y, z;  // rotation, joint to world
@@ -49,7 +49,7 @@ void load(const Clip& clip, int joint, const Clip::TranslationTrack* track, int 
 // child = parent * T(t) * R(q), for a whole block: frames past the end hold what was there and are not used.
 KINESPACE_VECTOR_CLONES
 void chain(const WorldBlock& __restrict parent, const LocalBlock& __restrict local, WorldBlock& __restrict child) {
-  for (int f = 0; f < block; ++f) {
+  for (int f = 0; f < frame_block; ++f) {
     const double w = parent.w[f], x = parent.x[f], y = parent.y[f], z = parent.z[f];
     const double tx = local.tx[f], ty = local.ty[f], tz = local.tz[f];
     const double ux = 2 * (y * tz - z * ty), uy = 2 * (z * tx - x * tz), uz = 2 * (x * ty - y * tx);
@@ -57,7 +57,7 @@ void chain(const WorldBlock& __restrict parent, const LocalBlock& __restrict loc
     child.py[f] = parent.py[f] + (ty + w * uy + (z * ux - x * uz));
     child.pz[f] = parent.pz[f] + (tz + w * uz + (x * uy - y * ux));
   }
-  for (int f = 0; f < block; ++f) {
+  for (int f = 0; f < frame_block; ++f) {
     const double w = parent.w[f], x = parent.x[f], y = parent.y[f], z = parent.z[f];
     const double a = local.w[f], b = local.x[f], c = local.y[f], d = local.z[f];
     child.w[f] = w * a - x * b - y * c - z * d;
@@ -102,8 +102,8 @@ JointPositions joint_positions(const Clip& clip) {
   WorldBlock origin{};
   origin.w.fill(1);
   LocalBlock local{};
-  for (int first = 0; first < clip.frames; first += block) {
-    const int count = std::min(block, clip.frames - first);
+  for (int first = 0; first < clip.frames; first += frame_block) {
+    const int count = std::min(frame_block, clip.frames - first);
     for (std::size_t j = 0; j < joints; ++j) {
       const int parent = clip.skeleton.joints[j].parent;
       load(clip, static_cast<int>(j), tracks[j], first, count, local);

@@ -12,7 +12,6 @@
 namespace kinespace {
 namespace {
 
-constexpr int travel_curves = 3;
 constexpr int steps_per_frame = 8;
 
 // When every motion is where, step by step: straight between the steps, so that a blend's time and the motions' own

@@ -9,8 +9,6 @@
 namespace kinespace {
 namespace {
 
-constexpr int travel_curves = 3;
-
 Eigen::Quaterniond about_vertical(double angle) {
   return {std::cos(angle / 2), 0, std::sin(angle / 2), 0};
 }

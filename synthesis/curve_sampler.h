@@ -11,6 +11,8 @@
 
 namespace kinespace {
 
+inline constexpr int travel_curves = 3;  // the root's position comes before the quaternions
+
 class CurveSampler {
  public:
   explicit CurveSampler(const ClipCurves& curves);

@@ -1,5 +1,7 @@
 #include "synthesis/library_clips.h"
 
+#include <algorithm>
+
 #include <fmt/format.h>
 
 #include "base/error.h"
@@ -18,6 +20,11 @@ std::vector<ClipRow> clips_of_one_tree(const LibraryView& library, std::span<con
                  .remedy = "`kinespace info LIB` lists the skeletons"});
   }
   return rows;
+}
+
+bool has_labels(const ClipRow& row, std::span<const std::string> wanted) {
+  return std::ranges::all_of(
+      wanted, [&](const std::string& label) { return std::ranges::find(row.labels, label) != row.labels.end(); });
 }
 
 }  // namespace kinespace

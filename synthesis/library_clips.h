@@ -13,4 +13,7 @@ namespace kinespace {
 // clips of different skeletons.
 [[nodiscard]] std::vector<ClipRow> clips_of_one_tree(const LibraryView& library, std::span<const std::string> names);
 
+// Whether the clip has every one of these labels.
+[[nodiscard]] bool has_labels(const ClipRow& row, std::span<const std::string> wanted);
+
 }  // namespace kinespace

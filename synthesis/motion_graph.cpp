@@ -23,15 +23,15 @@ namespace {
 
 constexpr const char* artifact_kind = "motion graph";
 constexpr double second_cost_cm = 0.5;
-constexpr std::size_t block = 32;  // clips that are taken in between two looks at the progress
+constexpr std::size_t clip_block = 32;  // clips that are taken in between two looks at the progress
 
 // Runs in parallel over all motions, in blocks, and tells how far it is.
 template <typename Work>
 void over_all(std::size_t count, const char* stage, const Progress& progress, const Work& work) {
-  for (std::size_t begin = 0; begin < count; begin += block) {
+  for (std::size_t begin = 0; begin < count; begin += clip_block) {
     progress.check_stop();
     progress.at(stage, static_cast<double>(begin) / static_cast<double>(count));
-    tbb::parallel_for(begin, std::min(begin + block, count), work);
+    tbb::parallel_for(begin, std::min(begin + clip_block, count), work);
   }
   progress.at(stage, 1);
 }
@@ -223,7 +223,7 @@ void MotionGraph::take_in(LibraryView& library, std::int64_t space_id, const Pro
   }
   std::size_t done = 0;
   for (const auto& [a, b] : pairs) {
-    if (done % block == 0) {
+    if (done % clip_block == 0) {
       progress.check_stop();
       progress.at("comparing neighbours", static_cast<double>(done) / static_cast<double>(pairs.size()));
     }

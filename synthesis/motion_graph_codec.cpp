@@ -8,7 +8,7 @@ namespace {
 
 // 1  first version
 constexpr std::uint32_t graph_version = 1;
-constexpr std::uint64_t most_functions = 64, most_points = 4096;
+constexpr std::uint64_t most_graph_functions = 64, most_points = 4096;
 
 }  // namespace
 
@@ -55,7 +55,7 @@ MotionGraph MotionGraph::unpack(std::span<const std::byte> bytes, const std::str
   graph.options_.connection.shortest_s = in.get<double>();
   graph.options_.connection.functions = in.get<std::int32_t>();
   const auto points = in.get<std::uint64_t>(), functions = in.get<std::uint64_t>();
-  if (points < 2 || points > most_points || functions < 1 || functions > most_functions) {
+  if (points < 2 || points > most_points || functions < 1 || functions > most_graph_functions) {
     in.fail("a motion graph with functions of a size that cannot be", "a whole motion graph");
   }
   const auto values = in.get_array<double>(points * functions);

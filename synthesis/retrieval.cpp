@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "fpca/pose_features.h"
 #include "kernels/dtw.h"
+#include "synthesis/library_clips.h"
 
 namespace kinespace {
 namespace {
@@ -18,11 +19,6 @@ struct Candidate {
   double squared = 0;  // distance of the vectors
   double cost = 0;     // of the DTW
 };
-
-bool has_labels(const ClipRow& row, const std::vector<std::string>& wanted) {
-  return std::ranges::all_of(
-      wanted, [&](const std::string& label) { return std::ranges::find(row.labels, label) != row.labels.end(); });
-}
 
 // The `keep` nearest vectors, nearest first, of clips that may be matches.
 std::vector<Candidate> nearest_vectors(const RetrievalMatrix& matrix, const std::vector<float>& query,

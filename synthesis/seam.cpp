@@ -11,7 +11,7 @@ namespace {
 constexpr double margin_s = 0.25;
 constexpr double share = 0.99;
 // Below these nothing moves: sources that rest give ratios to them rather than to zero.
-constexpr double least_speed = 5;          // cm/s
+constexpr double least_usual_speed = 5;          // cm/s
 constexpr double least_acceleration = 50;  // cm/s^2
 
 double percentile(std::vector<double>& values) {
@@ -56,7 +56,7 @@ UsualRates usual_rates(std::span<const JointRates* const> sources) {
     speed.insert(speed.end(), source->speed.begin(), source->speed.end());
     acceleration.insert(acceleration.end(), source->acceleration.begin(), source->acceleration.end());
   }
-  return {std::max(percentile(speed), least_speed), std::max(percentile(acceleration), least_acceleration)};
+  return {std::max(percentile(speed), least_usual_speed), std::max(percentile(acceleration), least_acceleration)};
 }
 
 SeamRatios seam_ratios(const JointRates& clip, double begin_s, double end_s, const UsualRates& usual) {

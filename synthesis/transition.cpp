@@ -10,12 +10,12 @@
 
 #include "base/error.h"
 #include "motion/kinematics.h"
+#include "synthesis/curve_sampler.h"
 #include "synthesis/side_track_blend.h"
 
 namespace kinespace {
 namespace {
 
-constexpr int travel_curves = 3;
 constexpr int clock_points = 257;
 
 // 0 to 1 with first and second derivative 0 at both ends.

@@ -11,9 +11,8 @@
 namespace kinespace {
 namespace {
 
-constexpr int lanes = 16;
 constexpr int first_groups = 16;  // whose best blocks are visited before the others are sorted
-using Vector = float __attribute__((vector_size(lanes * sizeof(float))));
+using Vector = float __attribute__((vector_size(vector_lanes * sizeof(float))));
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
@@ -22,21 +21,21 @@ KINESPACE_SIMD_BODY void box_bounds_body(const float* boxes, std::ptrdiff_t grou
                                          const float* query, float rest, float* out) {
   const std::ptrdiff_t sides = 2 * (boxed + 1);
   for (std::ptrdiff_t g = 0; g < groups; ++g) {
-    const float* box = boxes + g * sides * lanes;
+    const float* box = boxes + g * sides * vector_lanes;
     Vector sum{};
     for (std::ptrdiff_t d = 0; d <= boxed; ++d) {
       const float q = d < boxed ? query[d] : rest;
       Vector low;
       Vector high;
-      std::memcpy(&low, box + 2 * d * lanes, sizeof(Vector));
-      std::memcpy(&high, box + (2 * d + 1) * lanes, sizeof(Vector));
+      std::memcpy(&low, box + 2 * d * vector_lanes, sizeof(Vector));
+      std::memcpy(&high, box + (2 * d + 1) * vector_lanes, sizeof(Vector));
       const Vector below = low - q;
       const Vector above = q - high;
       Vector away = below > above ? below : above;
       away = away > 0.0F ? away : Vector{};
       sum += away * away;
     }
-    std::memcpy(out + g * lanes, &sum, sizeof(Vector));
+    std::memcpy(out + g * vector_lanes, &sum, sizeof(Vector));
   }
 }
 KINESPACE_SIMD(box_bounds, void,
@@ -55,16 +54,16 @@ KINESPACE_SIMD_BODY unsigned scan_block_body(const float* values, const float* r
   for (int level = 0; level < level_count; ++level) {
     for (; d < levels[level]; ++d) {
       Vector x;
-      std::memcpy(&x, values + static_cast<std::ptrdiff_t>(d) * lanes, sizeof(Vector));
+      std::memcpy(&x, values + static_cast<std::ptrdiff_t>(d) * vector_lanes, sizeof(Vector));
       x -= query[d];
       sum += x * x;
     }
     Vector rest;
-    std::memcpy(&rest, rests + static_cast<std::ptrdiff_t>(level) * lanes, sizeof(Vector));
+    std::memcpy(&rest, rests + static_cast<std::ptrdiff_t>(level) * vector_lanes, sizeof(Vector));
     rest -= query_rests[level];
     const Vector bound = sum + rest * rest;
     alive = 0;
-    for (int l = 0; l < lanes; ++l) alive |= (bound[l] <= limit ? 1U : 0U) << l;
+    for (int l = 0; l < vector_lanes; ++l) alive |= (bound[l] <= limit ? 1U : 0U) << l;
     if (alive == 0) break;
   }
   return alive;
@@ -138,10 +137,10 @@ struct VectorSearch::Found {
 };
 
 double VectorSearch::exact(int block, int lane, const Scratch& scratch) const {
-  const auto slot = static_cast<std::size_t>(block) * lanes + static_cast<std::size_t>(lane);
+  const auto slot = static_cast<std::size_t>(block) * vector_lanes + static_cast<std::size_t>(lane);
   if (rows_.rows() != 0) return squared_distance_strided(rows_.row(ids_[slot]).data(), 1, scratch.query);
-  const std::size_t start = static_cast<std::size_t>(block) * static_cast<std::size_t>(dimensions_) * lanes;
-  return squared_distance_strided(values_.data() + start + static_cast<std::size_t>(lane), lanes, scratch.query);
+  const std::size_t start = static_cast<std::size_t>(block) * static_cast<std::size_t>(dimensions_) * vector_lanes;
+  return squared_distance_strided(values_.data() + start + static_cast<std::size_t>(lane), vector_lanes, scratch.query);
 }
 
 void VectorSearch::turn_query(std::span<const float> query, Scratch& scratch) const {
@@ -175,13 +174,13 @@ void VectorSearch::turn_query(std::span<const float> query, Scratch& scratch) co
 }
 
 void VectorSearch::bound_blocks(Scratch& scratch, std::span<const std::uint8_t> allowed) const {
-  const int groups = (blocks_ + lanes - 1) / lanes;
-  scratch.bounds.resize(static_cast<std::size_t>(groups) * lanes);
+  const int groups = (blocks_ + vector_lanes - 1) / vector_lanes;
+  scratch.bounds.resize(static_cast<std::size_t>(groups) * vector_lanes);
   box_bounds(boxes_.data(), groups, boxed_, scratch.turned.data(), scratch.rest[levels_.size()], scratch.bounds.data());
   std::fill(scratch.bounds.begin() + blocks_, scratch.bounds.end(), infinity);
   if (allowed.empty()) return;
   for (std::size_t b = 0; b < static_cast<std::size_t>(blocks_); ++b) {
-    const auto rows = std::span(ids_).subspan(b * lanes, lanes);
+    const auto rows = std::span(ids_).subspan(b * vector_lanes, vector_lanes);
     const bool any = std::ranges::any_of(
         rows, [&](std::int32_t id) { return id >= 0 && allowed[static_cast<std::size_t>(id)] != 0; });
     if (!any) scratch.bounds[b] = infinity;
@@ -190,12 +189,12 @@ void VectorSearch::bound_blocks(Scratch& scratch, std::span<const std::uint8_t> 
 
 void VectorSearch::visit(int block, const Scratch& scratch, std::span<const std::uint8_t> allowed, Found& found) const {
   const auto b = static_cast<std::size_t>(block);
-  unsigned alive = scan_block(values_.data() + b * static_cast<std::size_t>(dimensions_) * lanes,
-                              rests_.data() + b * levels_.size() * lanes, scratch.turned.data(), scratch.rest.data(),
+  unsigned alive = scan_block(values_.data() + b * static_cast<std::size_t>(dimensions_) * vector_lanes,
+                              rests_.data() + b * levels_.size() * vector_lanes, scratch.turned.data(), scratch.rest.data(),
                               levels_.data(), static_cast<int>(levels_.size()), found.limit);
   for (int l = 0; alive != 0; ++l, alive >>= 1U) {
     if ((alive & 1U) == 0) continue;
-    const std::int32_t id = ids_[b * lanes + static_cast<std::size_t>(l)];
+    const std::int32_t id = ids_[b * vector_lanes + static_cast<std::size_t>(l)];
     if (id < 0 || (!allowed.empty() && allowed[static_cast<std::size_t>(id)] == 0)) continue;
     found.add(exact(block, l, scratch), id);
   }
@@ -215,8 +214,8 @@ std::span<const Neighbour> VectorSearch::nearest(std::span<const float> query, i
 
   // The best block of each of the best groups, for a limit to begin with; these are not visited again.
   order.clear();
-  for (int start = 0; start < blocks_; start += lanes) {
-    const auto best = std::min_element(scratch.bounds.begin() + start, scratch.bounds.begin() + start + lanes);
+  for (int start = 0; start < blocks_; start += vector_lanes) {
+    const auto best = std::min_element(scratch.bounds.begin() + start, scratch.bounds.begin() + start + vector_lanes);
     order.emplace_back(*best, static_cast<int>(best - scratch.bounds.begin()));
   }
   const auto first = std::min<std::ptrdiff_t>(first_groups, std::ssize(order));

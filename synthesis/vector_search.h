@@ -30,6 +30,8 @@
 
 namespace kinespace {
 
+inline constexpr int vector_lanes = 16;  // rows of a block, and blocks of a group of boxes
+
 struct Neighbour {
   std::int64_t row = 0;
   double squared = 0;  // distance

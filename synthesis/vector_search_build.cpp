@@ -15,12 +15,11 @@
 namespace kinespace {
 namespace {
 
-constexpr int lanes = 16;
 constexpr int most_boxed = 24;
 constexpr int most_split = 16;             // leading coordinates that blocks are divided by
 constexpr Eigen::Index axes_rows = 16384;  // rows that the principal axes are found from
 constexpr Eigen::Index most_rows = 1 << 30;
-constexpr float largest = 1e12F;  // squares of it times any weight, and their sums, are floats
+constexpr float largest_component = 1e12F;  // squares of it times any weight, and their sums, are floats
 
 [[noreturn]] void refuse(const std::string& found, const std::string& expected) {
   throw Error(ErrorKind::usage, {.found = found, .expected = expected});
@@ -28,7 +27,7 @@ constexpr float largest = 1e12F;  // squares of it times any weight, and their s
 
 void check_row(std::span<const float> row, const std::string& what) {
   for (std::size_t d = 0; d < row.size(); ++d) {
-    if (std::abs(row[d]) <= largest) continue;
+    if (std::abs(row[d]) <= largest_component) continue;
     throw Error(ErrorKind::bad_input,
                 {.found = fmt::format("{}, dimension {}: {}", what, d, row[d]), .expected = "numbers within +-1e12"});
   }
@@ -66,10 +65,10 @@ class Divider {
   }
 
   void divide(std::size_t begin, std::size_t end) {
-    const std::size_t blocks = (end - begin + lanes - 1) / lanes;
+    const std::size_t blocks = (end - begin + vector_lanes - 1) / vector_lanes;
     if (blocks < 2) return;
     const Eigen::Index d = widest(begin, end);
-    const std::size_t middle = begin + blocks / 2 * lanes;
+    const std::size_t middle = begin + blocks / 2 * vector_lanes;
     const auto at = [&](std::size_t i) { return order_.begin() + static_cast<std::ptrdiff_t>(i); };
     std::nth_element(at(begin), at(middle), at(end), [&](std::int32_t a, std::int32_t b) {
       return std::pair(rows_(a, d), a) < std::pair(rows_(b, d), b);
@@ -138,35 +137,35 @@ void VectorSearch::turn_rows(RowMatrix<float>& rows) {
 
 void VectorSearch::gather(const RowMatrix<float>& rows) {
   const Divider divider(rows);
-  blocks_ = static_cast<int>((size_ + lanes - 1) / lanes);
+  blocks_ = static_cast<int>((size_ + vector_lanes - 1) / vector_lanes);
   const auto blocks = static_cast<std::size_t>(blocks_);
   const auto dims = static_cast<std::size_t>(dimensions_);
   const auto boxed = static_cast<std::size_t>(boxed_);
   const std::size_t sides = 2 * (boxed + 1);
-  ids_.assign(blocks * lanes, -1);
+  ids_.assign(blocks * vector_lanes, -1);
   std::ranges::copy(divider.order(), ids_.begin());
-  values_.assign(blocks * dims * lanes, 0.0F);
-  rests_.assign(blocks * levels_.size() * lanes, 0.0F);
-  boxes_.assign((blocks + lanes - 1) / lanes * lanes * sides, 0.0F);
+  values_.assign(blocks * dims * vector_lanes, 0.0F);
+  rests_.assign(blocks * levels_.size() * vector_lanes, 0.0F);
+  boxes_.assign((blocks + vector_lanes - 1) / vector_lanes * vector_lanes * sides, 0.0F);
 
   std::vector<double> tail(dims + 1);  // squared norm of the coordinates from d on
-  for (std::size_t slot = 0; slot < blocks * lanes; ++slot) {
-    const std::size_t block = slot / lanes;
-    const std::size_t lane = slot % lanes;
+  for (std::size_t slot = 0; slot < blocks * vector_lanes; ++slot) {
+    const std::size_t block = slot / vector_lanes;
+    const std::size_t lane = slot % vector_lanes;
     // Lanes without a row repeat the block's first, which leaves its box alone.
-    const auto x = row_of(rows, ids_[slot] >= 0 ? ids_[slot] : ids_[block * lanes]);
+    const auto x = row_of(rows, ids_[slot] >= 0 ? ids_[slot] : ids_[block * vector_lanes]);
     tail[dims] = 0;
     for (std::size_t d = dims; d-- > 0;) tail[d] = tail[d + 1] + static_cast<double>(x[d]) * static_cast<double>(x[d]);
-    for (std::size_t d = 0; d < dims; ++d) values_[(block * dims + d) * lanes + lane] = x[d];
+    for (std::size_t d = 0; d < dims; ++d) values_[(block * dims + d) * vector_lanes + lane] = x[d];
     for (std::size_t level = 0; level < levels_.size(); ++level) {
-      rests_[(block * levels_.size() + level) * lanes + lane] =
+      rests_[(block * levels_.size() + level) * vector_lanes + lane] =
           static_cast<float>(std::sqrt(tail[static_cast<std::size_t>(levels_[level])]));
     }
-    float* box = boxes_.data() + block / lanes * sides * lanes + block % lanes;
+    float* box = boxes_.data() + block / vector_lanes * sides * vector_lanes + block % vector_lanes;
     for (std::size_t d = 0; d <= boxed; ++d) {
       const float value = d < boxed ? x[d] : static_cast<float>(std::sqrt(tail[boxed]));
-      float& low = box[2 * d * lanes];
-      float& high = box[(2 * d + 1) * lanes];
+      float& low = box[2 * d * vector_lanes];
+      float& high = box[(2 * d + 1) * vector_lanes];
       low = lane == 0 ? value : std::min(low, value);
       high = lane == 0 ? value : std::max(high, value);
     }

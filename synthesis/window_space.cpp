@@ -20,7 +20,7 @@ namespace {
 
 constexpr int function_windows = 4000;    // enough to find functions of time
 constexpr int component_windows = 16000;  // and components of scores
-constexpr int block = 512;                // windows projected at once
+constexpr int window_block = 512;                // windows projected at once
 
 // out (rows x curves) = projector (rows x samples) times in (samples x curves), sums in the order of the samples.
 KINESPACE_SIMD_BODY void project_window_body(const float* projector, std::ptrdiff_t rows, std::ptrdiff_t samples,
@@ -263,8 +263,8 @@ int WindowSpace::windows(Eigen::Index samples) const {
 RowMatrix<float> WindowSpace::vectors(const WindowSamples& stretch) const {
   const int count = windows(stretch.rows());
   RowMatrix<float> out(count, components_.cols());
-  for (int first = 0; first < count; first += block) {
-    const int n = std::min(block, count - first);
+  for (int first = 0; first < count; first += window_block) {
+    const int n = std::min(window_block, count - first);
     const RowMatrix<double> part = scores(stretch, first, 1, n).cast<double>();
     out.middleRows(first, n) = project(part, mean_, components_).cast<float>();
   }

@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include "base/error.h"
+#include "synthesis/library_clips.h"
 
 namespace kinespace {
 namespace {
@@ -50,11 +51,6 @@ std::vector<SampledStretch> sample_clips(LibraryView& library, std::int64_t spac
     for (auto& stretches : sampled) std::ranges::move(stretches, std::back_inserter(out));
   }
   return out;
-}
-
-bool has_labels(const ClipRow& row, const std::vector<std::string>& wanted) {
-  return std::ranges::all_of(
-      wanted, [&](const std::string& label) { return std::ranges::find(row.labels, label) != row.labels.end(); });
 }
 
 bool overlaps_better(const std::vector<Match>& better, const Match& match) {

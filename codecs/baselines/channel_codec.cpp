@@ -28,7 +28,7 @@ class TargetSearch {
       tolerance = next(tolerance, ratio);
       if (tolerance < finest || tolerance > coarsest) break;
     }
-    if (best_.empty()) fail();
+    if (best_.empty()) cannot_meet(target_);
     return std::move(best_);
   }
 
@@ -73,16 +73,6 @@ class TargetSearch {
     const double wanted = (aim - std::log(std::max(ratio, 1e-3))) * (target_.bytes ? -1.6 : 1.1);
     const double least = target_.bytes ? -0.02 : 0.02;  // onwards, whatever happens
     return tolerance * std::exp(std::clamp(wanted, -2.3, 2.3) + (ratio <= 1 ? least : -least));
-  }
-
-  [[noreturn]] void fail() const {
-    const std::string what = target_.bytes ? fmt::format("{} bytes", *target_.bytes)
-                             : target_.mean_error_cm
-                                 ? fmt::format("a mean joint error of {} cm", *target_.mean_error_cm)
-                                 : fmt::format("a largest joint error of {} cm", *target_.max_error_cm);
-    throw Error(ErrorKind::usage,
-                {.found = "a target that cannot be met: " + what,
-                 .expected = target_.bytes ? "more; tables and names alone take that" : "a larger one"});
   }
 
   ChannelEncoder& encoder_;

@@ -10,16 +10,6 @@
 #include "mesh/rigid.h"
 
 namespace kinespace {
-namespace {
-
-Points rows_of(const Points& all, std::span<const std::int32_t> kept) {
-  Points out(static_cast<Eigen::Index>(kept.size()), 3);
-  for (std::size_t i = 0; i < kept.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = all.row(kept[i]);
-  return out;
-}
-
-}  // namespace
-
 HarmonicsAnalysis::HarmonicsAnalysis(const MeshSequence& mesh, const std::optional<Decimation>& decimation,
                                      const HarmonicsSettings& settings, const Progress& progress)
     : mesh_(mesh), decimation_(decimation), settings_(settings), progress_(progress), split_{mesh.frames} {

@@ -10,12 +10,6 @@
 namespace kinespace {
 namespace {
 
-Points rows_of(const Points& all, std::span<const std::int32_t> kept) {
-  Points out(static_cast<Eigen::Index>(kept.size()), 3);
-  for (std::size_t i = 0; i < kept.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = all.row(kept[i]);
-  return out;
-}
-
 class HarmonicsReader final : public MeshStreamReader {
  public:
   HarmonicsReader(Bitstream stream, BasisCache* cache) : stream_(std::move(stream)) {

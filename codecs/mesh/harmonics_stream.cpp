@@ -19,6 +19,12 @@ KeyMesh flat_mesh(int vertices, std::vector<Triangle> triangles) {
 
 }  // namespace
 
+Points rows_of(const Points& all, std::span<const std::int32_t> kept) {
+  Points out(static_cast<Eigen::Index>(kept.size()), 3);
+  for (std::size_t i = 0; i < kept.size(); ++i) out.row(static_cast<Eigen::Index>(i)) = all.row(kept[i]);
+  return out;
+}
+
 int FrameBlocks::of(int frame) const {
   int block = static_cast<int>(std::int64_t{frame} * count() / frames);
   while (first(block) > frame) --block;

@@ -22,6 +22,9 @@
 
 namespace kinespace {
 
+// Those rows of `all` that are kept, in their order.
+[[nodiscard]] Points rows_of(const Points& all, std::span<const std::int32_t> kept);
+
 inline constexpr int most_block_frames = 400;
 // Blocks of nearly equal length.
 struct FrameBlocks {

@@ -12,7 +12,7 @@
 namespace kinespace {
 namespace {
 
-constexpr std::int64_t largest = std::int64_t{1} << 40;
+constexpr std::int64_t largest_weight = std::int64_t{1} << 40;
 
 int context(std::int64_t last_miss, std::int64_t miss_before) {
   return std::min(bit_length(static_cast<std::uint64_t>(std::abs(last_miss) + std::abs(miss_before))), 15);
@@ -124,7 +124,7 @@ std::vector<std::int64_t> unpack_weights(std::span<const std::byte> bytes, int c
     for (const std::int32_t v : walk.order()) {
       const std::int64_t miss = in.get(context(last, before));
       const std::int64_t value = walk.expected(v, row) + miss;
-      if (value < -largest || value > largest) in.damaged();
+      if (value < -largest_weight || value > largest_weight) in.damaged();
       row[static_cast<std::size_t>(v)] = value;
       before = last;
       last = miss;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double turn_step = 1.0 / 16384;
 constexpr double shift_step = 1.0 / 32768;
-constexpr std::int64_t most_steps = std::int64_t{1} << 30;
+constexpr std::int64_t most_rigid_steps = std::int64_t{1} << 30;
 
 std::int64_t expected(std::span<const std::array<std::int32_t, 6>> steps, std::size_t f, std::size_t i) {
   if (f == 0) return 0;
@@ -46,7 +46,7 @@ RigidTrack quantised(std::span<const RigidMotion> motions, double size) {
     for (int d = 0; d < 3; ++d) {
       s[static_cast<std::size_t>(d)] = static_cast<std::int32_t>(std::lround(turn[d] / turn_step));
       const double shift = step > 0 ? motion.translation[d] / step : 0;
-      if (!(std::abs(shift) < static_cast<double>(most_steps))) {
+      if (!(std::abs(shift) < static_cast<double>(most_rigid_steps))) {
         throw Error(ErrorKind::bad_input, {.found = "a mesh that travels more than 32768 times its size",
                                            .expected = "a mesh that stays nearer"});
       }
@@ -78,7 +78,7 @@ RigidTrack unpack_track(std::span<const std::byte> bytes, int frames, double siz
     for (std::size_t i = 0; i < 6; ++i) {
       const std::int64_t off = in.get(context(miss[i], i));
       const std::int64_t at = expected(out.steps, static_cast<std::size_t>(f), i) + off;
-      if (at < -most_steps || at > most_steps) in.damaged();
+      if (at < -most_rigid_steps || at > most_rigid_steps) in.damaged();
       s[i] = static_cast<std::int32_t>(at);
       miss[i] = off;
     }

@@ -10,15 +10,6 @@
 namespace kinespace {
 namespace {
 
-[[noreturn]] void cannot_meet(const CodecTarget& target) {
-  std::string found;
-  if (target.mean_error_cm) found = fmt::format("a mean joint error of {} cm", *target.mean_error_cm);
-  if (target.max_error_cm) found = fmt::format("a largest joint error of {} cm", *target.max_error_cm);
-  if (target.bytes) found = fmt::format("{} bytes", *target.bytes);
-  throw Error(ErrorKind::usage, {.found = "a target that cannot be met: " + found,
-                                 .expected = target.bytes ? "more; tables and names alone take that" : "a larger one"});
-}
-
 // How coarse an attempt is against its target: 1 on it, above 1 too coarse.
 double excess_of(const CodecTarget& target, const CodedAttempt& attempt) {
   if (target.bytes)

@@ -23,13 +23,13 @@ namespace {
 
 constexpr const char* artifact_kind = "mesh basis";
 
-struct Kind {
+struct CachedKind {
   std::string name;
   MeshCodecOptions options;
   int bases;  // that a stream of it needs
 };
 
-class MeshBasisCache : public testing::TestWithParam<Kind> {
+class MeshBasisCache : public testing::TestWithParam<CachedKind> {
  protected:
   [[nodiscard]] std::filesystem::path library() const { return folder_ / "meshes.kspace"; }
   [[nodiscard]] static Bytes stream() {
@@ -70,9 +70,9 @@ class MeshBasisCache : public testing::TestWithParam<Kind> {
   int found_ = 0, computed_ = 0;
 };
 INSTANTIATE_TEST_SUITE_P(All, MeshBasisCache,
-                         testing::Values(Kind{"standard", {.kg = 1.0, .bases = 60}, 1},
-                                         Kind{"coarse", {.kg = 4.0, .bases = 40, .coarse_vertices = 200}, 1},
-                                         Kind{"paper", {.profile = MeshProfile::paper, .bases = 40, .clusters = 2}, 2}),
+                         testing::Values(CachedKind{"standard", {.kg = 1.0, .bases = 60}, 1},
+                                         CachedKind{"coarse", {.kg = 4.0, .bases = 40, .coarse_vertices = 200}, 1},
+                                         CachedKind{"paper", {.profile = MeshProfile::paper, .bases = 40, .clusters = 2}, 2}),
                          [](const auto& kind) { return kind.param.name; });
 
 void mend_checksum(Bytes& blob) {

@@ -39,13 +39,13 @@ bool decodes(std::span<const std::byte> bytes) {
   return good;
 }
 
-struct Kind {
+struct DamagedKind {
   std::string name;
   std::string codec;
   MeshCodecOptions options;
 };
-const std::vector<Kind>& kinds() {
-  static const std::vector<Kind> all{
+const std::vector<DamagedKind>& damaged_kinds() {
+  static const std::vector<DamagedKind> all{
       {"standard", "mesh-harmonics", {.kg = 1.0, .bases = 40}},
       {"coarse", "mesh-harmonics", {.kg = 4.0, .bases = 40, .coarse_vertices = 120}},
       {"paper", "mesh-harmonics", {.profile = MeshProfile::paper, .bases = 40, .clusters = 2}},
@@ -69,7 +69,7 @@ Bytes with_functions(const Bytes& stream, int functions) {
   return forged(stream, "setup", std::move(out).take());
 }
 
-class MeshDamage : public testing::TestWithParam<Kind> {
+class MeshDamage : public testing::TestWithParam<DamagedKind> {
  protected:
   [[nodiscard]] static const Bytes& stream() {
     static std::map<std::string, Bytes, std::less<>> made;
@@ -81,7 +81,7 @@ class MeshDamage : public testing::TestWithParam<Kind> {
     return out;
   }
 };
-INSTANTIATE_TEST_SUITE_P(All, MeshDamage, testing::ValuesIn(kinds()), [](const auto& kind) { return kind.param.name; });
+INSTANTIATE_TEST_SUITE_P(All, MeshDamage, testing::ValuesIn(damaged_kinds()), [](const auto& kind) { return kind.param.name; });
 
 TEST_P(MeshDamage, every_prefix_is_an_error) {
   ASSERT_TRUE(decodes(stream()));

@@ -16,13 +16,13 @@
 namespace kinespace::test {
 namespace {
 
-struct Kind {
+struct OddKind {
   std::string name;
   std::string codec;
   MeshCodecOptions options;
 };
 
-class OddMesh : public testing::TestWithParam<Kind> {
+class OddMesh : public testing::TestWithParam<OddKind> {
  protected:
   [[nodiscard]] static Bytes encode(const MeshSequence& mesh) {
     return encode_mesh(GetParam().codec, mesh, GetParam().options);
@@ -37,14 +37,14 @@ class OddMesh : public testing::TestWithParam<Kind> {
   }
 };
 INSTANTIATE_TEST_SUITE_P(All, OddMesh,
-                         testing::Values(Kind{"standard", "mesh-harmonics", {.kg = 2.0}},
-                                         Kind{"coarse", "mesh-harmonics", {.kg = 4.0, .coarse_vertices = 150}},
-                                         Kind{"paper", "mesh-harmonics", {.kg = 2.0, .profile = MeshProfile::paper}},
-                                         Kind{"pca", "mesh-pca", {.kg = 2.0}},
-                                         Kind{"draco", "mesh-draco", {.kg = 2.0}}),
+                         testing::Values(OddKind{"standard", "mesh-harmonics", {.kg = 2.0}},
+                                         OddKind{"coarse", "mesh-harmonics", {.kg = 4.0, .coarse_vertices = 150}},
+                                         OddKind{"paper", "mesh-harmonics", {.kg = 2.0, .profile = MeshProfile::paper}},
+                                         OddKind{"pca", "mesh-pca", {.kg = 2.0}},
+                                         OddKind{"draco", "mesh-draco", {.kg = 2.0}}),
                          [](const auto& kind) { return kind.param.name; });
 
-MeshSequence tube() {
+MeshSequence small_tube() {
   return bending_tube(250, 6, 1.0);
 }
 
@@ -71,7 +71,7 @@ MeshSequence with_isolated_vertex(const MeshSequence& mesh) {
 }
 
 TEST_P(OddMesh, degenerate_triangles_are_kept) {
-  MeshSequence mesh = tube();
+  MeshSequence mesh = small_tube();
   mesh.triangles.push_back({3, 3, 7});
   mesh.triangles.push_back({9, 9, 9});
   ASSERT_EQ(report(mesh).degenerate_triangles, 2);
@@ -79,7 +79,7 @@ TEST_P(OddMesh, degenerate_triangles_are_kept) {
 }
 
 TEST_P(OddMesh, triangles_without_area_are_kept) {
-  MeshSequence mesh = tube();
+  MeshSequence mesh = small_tube();
   for (int f = 0; f < mesh.frames; ++f) {
     for (int v = 40; v < 44; ++v) std::copy_n(mesh.frame(f).begin(), 3, mesh.frame(f).begin() + std::ptrdiff_t{3} * v);
   }
@@ -88,7 +88,7 @@ TEST_P(OddMesh, triangles_without_area_are_kept) {
 }
 
 TEST_P(OddMesh, duplicate_triangles_are_kept) {
-  MeshSequence mesh = tube();
+  MeshSequence mesh = small_tube();
   mesh.triangles.push_back(mesh.triangles[5]);
   mesh.triangles.push_back(mesh.triangles[5]);
   ASSERT_EQ(report(mesh).duplicate_triangles, 2);
@@ -96,7 +96,7 @@ TEST_P(OddMesh, duplicate_triangles_are_kept) {
 }
 
 TEST_P(OddMesh, non_manifold_edges_are_kept) {
-  MeshSequence mesh = tube();
+  MeshSequence mesh = small_tube();
   const Triangle t = mesh.triangles[8];
   mesh.triangles.push_back({t[0], t[1], 200});
   mesh.triangles.push_back({t[1], t[0], 100});
@@ -105,13 +105,13 @@ TEST_P(OddMesh, non_manifold_edges_are_kept) {
 }
 
 TEST_P(OddMesh, isolated_vertices_are_kept) {
-  const MeshSequence mesh = with_isolated_vertex(tube());
+  const MeshSequence mesh = with_isolated_vertex(small_tube());
   ASSERT_EQ(report(mesh).isolated_vertices, 1);
   expect_kept(mesh);
 }
 
 TEST_P(OddMesh, several_components_are_kept) {
-  const MeshSequence mesh = joined(tube(), bending_tube(100, 6, 0.5));
+  const MeshSequence mesh = joined(small_tube(), bending_tube(100, 6, 0.5));
   ASSERT_EQ(report(mesh).components, 2);
   expect_kept(mesh);
 }
@@ -139,7 +139,7 @@ TEST_P(OddMesh, a_mesh_that_is_one_point_is_kept) {
 
 TEST_P(OddMesh, numbers_that_are_not_finite_are_refused_by_frame_and_vertex) {
   for (const float number : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
-    MeshSequence mesh = tube();
+    MeshSequence mesh = small_tube();
     mesh.frame(3)[3 * 17 + 1] = number;
     try {
       static_cast<void>(encode(mesh));
@@ -153,7 +153,7 @@ TEST_P(OddMesh, numbers_that_are_not_finite_are_refused_by_frame_and_vertex) {
 }
 
 TEST_P(OddMesh, triangles_of_vertices_that_are_not_there_are_refused) {
-  MeshSequence mesh = tube();
+  MeshSequence mesh = small_tube();
   mesh.triangles[4][1] = mesh.vertices;
   try {
     static_cast<void>(encode(mesh));
@@ -164,7 +164,7 @@ TEST_P(OddMesh, triangles_of_vertices_that_are_not_there_are_refused) {
 }
 
 TEST_P(OddMesh, more_bases_than_vertices_are_refused_with_their_number) {
-  const MeshSequence mesh = tube();
+  const MeshSequence mesh = small_tube();
   MeshCodecOptions options = GetParam().options;
   options.bases = mesh.vertices + 1;
   try {

@@ -29,12 +29,12 @@ const std::vector<Way>& ways() {
   return all;
 }
 
-std::vector<Clip> some_clips() {
+std::vector<Clip> rma_clips() {
   return {test::sample_clips().begin(), test::sample_clips().begin() + 4};
 }
 
 TEST(RmaCodec, errors_are_met_measured_and_written_down) {
-  const std::vector<Clip> clips = some_clips();
+  const std::vector<Clip> clips = rma_clips();
   for (const Way& way : ways()) {
     for (const double target : {3.0, 1.0}) {
       const Bytes stream = encode(way.codec, clips, {.target = {.mean_error_cm = target}, .settings = way.settings});
@@ -47,7 +47,7 @@ TEST(RmaCodec, errors_are_met_measured_and_written_down) {
 }
 
 TEST(RmaCodec, largest_errors_and_sizes_are_met) {
-  const std::vector<Clip> clips = some_clips();
+  const std::vector<Clip> clips = rma_clips();
   for (const Way& way : ways()) {
     const Bytes near = encode(way.codec, clips, {.target = {.max_error_cm = 6}, .settings = way.settings});
     EXPECT_LE(test::error_of(clips, open_stream(near, "s")->decode_all()).largest, 6) << way.codec;
@@ -59,7 +59,7 @@ TEST(RmaCodec, largest_errors_and_sizes_are_met) {
 }
 
 TEST(RmaCodec, names_rates_skeletons_and_ranges_come_back_the_same_on_any_number_of_threads) {
-  const std::vector<Clip> clips = some_clips();
+  const std::vector<Clip> clips = rma_clips();
   for (const Way& way : ways()) {
     const Bytes stream = encode(way.codec, clips, {.settings = way.settings});
     const auto reader = open_stream(stream, "s");
@@ -114,7 +114,7 @@ TEST(RmaCodec, one_cycle_a_thousand_times_takes_few_bytes_and_repeats_pay) {
 }
 
 TEST(RmaCodec, the_default_profile_never_loses_to_every_clip_unique) {
-  const std::vector<Clip> clips = some_clips();
+  const std::vector<Clip> clips = rma_clips();
   for (const double target : {2.0, 0.5}) {
     const auto size = [&](double repeats) {
       return encode("rma", clips, {.target = {.mean_error_cm = target}, .settings = {{"repeats", repeats}}}).size();
@@ -156,7 +156,7 @@ TEST(RmaCodec, a_very_long_clip_is_coded_whole) {
 }
 
 TEST(RmaCodec, seams_are_told_for_both_profiles) {
-  const std::vector<Clip> clips = some_clips();
+  const std::vector<Clip> clips = rma_clips();
   for (const double profile : {0.0, 1.0}) {
     const Bytes stream = encode("rma", clips, {.settings = {{"profile", profile}}});
     const auto seams = rma_seams(stream, "s");
@@ -169,7 +169,7 @@ TEST(RmaCodec, seams_are_told_for_both_profiles) {
 }
 
 TEST(RmaCodec, forged_parts_of_the_papers_profile_are_errors_or_clips) {
-  std::vector<Clip> clips = some_clips();
+  std::vector<Clip> clips = rma_clips();
   for (Clip& clip : clips) clip = slice(clip, 0, std::min(clip.frames, 60));
   const Bytes stream = encode("rma", clips, {.settings = {{"profile", 1}}});
   const Bitstream parts = Bitstream::parse(stream, "s");

@@ -15,7 +15,7 @@
 namespace kinespace {
 namespace {
 
-std::vector<double> some_curve(int frames) {
+std::vector<double> part_curve(int frames) {
   std::vector<double> out;
   for (int f = 0; f < frames; ++f) out.push_back(10 * std::sin(0.05 * f) + (f > 60 && f < 66 ? 5 : 0) + 0.2 * f);
   return out;
@@ -49,7 +49,7 @@ TEST(RmaSplines, the_curve_passes_through_its_control_points_and_straight_lines_
 }
 
 TEST(RmaSplines, added_control_points_bring_the_curve_within_the_tolerance) {
-  const std::vector<double> curve = some_curve(150);
+  const std::vector<double> curve = part_curve(150);
   const std::vector<int> start = regular_knots(150, 16);
   std::size_t last = start.size();
   for (const double tolerance : {5.0, 1.0, 0.1, 0.0}) {

@@ -15,7 +15,7 @@ using test::add_clip;
 using test::Cycle;
 using test::empty_table;
 
-constexpr double rate = 30;
+constexpr double path_rate = 30;
 
 struct Group {
   FrameTable table;
@@ -37,7 +37,7 @@ double warped(double t) {
 }
 
 FrameTable walk_with_changing_pace() {
-  FrameTable out = empty_table(10, rate);
+  FrameTable out = empty_table(10, path_rate);
   const Cycle walk(10, 0);
   add_clip(out, 300, [&](double t) { return walk(warped(t)); });
   return out;
@@ -128,7 +128,7 @@ TEST(rma_paths, never_fall_and_never_cross_from_clip_to_clip) {
 
 // Two walks of 120 frames; in the second, frames 50 to 50 + disturbed are elsewhere.
 std::size_t paths_with_disturbance(int disturbed) {
-  FrameTable table = empty_table(10, rate);
+  FrameTable table = empty_table(10, path_rate);
   const Cycle walk(10, 0), other(10, 1);
   add_clip(table, 120, [&](double t) { return walk(t / 130); });
   add_clip(table, 120, [&](double t) { return t >= 50 && t < 50 + disturbed ? other(t / 50) : walk(t / 130); });
@@ -143,7 +143,7 @@ TEST(rma_paths, a_short_bridge_joins_two_paths_and_a_long_one_does_not) {
 }
 
 TEST(rma_paths, short_paths_are_dropped) {
-  FrameTable table = empty_table(10, rate);
+  FrameTable table = empty_table(10, path_rate);
   const Cycle walk(10, 0), other(10, 1);
   add_clip(table, 120, [&](double t) { return walk(t / 130); });
   add_clip(table, 120, [&](double t) { return t < 12 ? walk((t + 40) / 130) : other(t / 130); });
@@ -156,21 +156,21 @@ TEST(rma_paths, short_paths_are_dropped) {
 }
 
 TEST(rma_paths, a_motion_that_never_comes_back_has_none) {
-  FrameTable table = empty_table(10, rate);
+  FrameTable table = empty_table(10, path_rate);
   add_clip(table, 600, [](double t) { return test::one_way(10, t); });
   const Group group(std::move(table));
   EXPECT_TRUE(find_posture_paths(group.distances(), {.threshold = 0.05, .lag_s = 2}).empty());
 }
 
 TEST(rma_paths, a_held_pose_has_no_valleys) {
-  FrameTable table = empty_table(10, rate);
+  FrameTable table = empty_table(10, path_rate);
   add_clip(table, 300, [](double /*t*/) { return Eigen::VectorXd::Constant(10, 4); });
   const Group group(std::move(table));
   EXPECT_TRUE(find_posture_paths(group.distances()).empty());
 }
 
 TEST(rma_paths, crowds_are_thinned) {
-  FrameTable table = empty_table(10, rate);
+  FrameTable table = empty_table(10, path_rate);
   const Cycle walk(10, 0);
   add_clip(table, 2400, [&](double t) { return walk(t / 24); });
   const Group group(std::move(table));

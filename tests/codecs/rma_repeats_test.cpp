@@ -25,7 +25,7 @@ using test::data_folder;
 using test::empty_table;
 using Kind = RepeatClip::Kind;
 
-constexpr double rate = 60;
+constexpr double repeat_rate = 60;
 
 void expect_sound(const RepeatAnalysis& analysis, const FrameTable& table) {
   std::int64_t at = 0;
@@ -138,7 +138,7 @@ TEST(rma_choice, overheads_make_a_clip_cost_more) {
 
 // Three walks at changing pace, in clips of their own, and something else before and after each.
 FrameTable walks_between_other_things() {
-  FrameTable out = empty_table(12, rate);
+  FrameTable out = empty_table(12, repeat_rate);
   const Cycle walk(12, 0);
   for (int c = 0; c < 3; ++c) {
     add_clip(out, 500, [&](double t) {
@@ -160,7 +160,7 @@ TEST(rma_repeats, a_walk_at_changing_pace_is_found_again) {
 }
 
 TEST(rma_repeats, a_motion_without_repetition_is_all_unique) {
-  FrameTable table = empty_table(12, rate);
+  FrameTable table = empty_table(12, repeat_rate);
   add_clip(table, 1500, [](double t) { return test::one_way(12, t); });
   const RepeatAnalysis analysis = analyse_repeats(table);
   expect_sound(analysis, table);
@@ -168,7 +168,7 @@ TEST(rma_repeats, a_motion_without_repetition_is_all_unique) {
 }
 
 TEST(rma_repeats, a_cycle_a_thousand_times_is_kept_a_few_times) {
-  FrameTable table = empty_table(12, rate);
+  FrameTable table = empty_table(12, repeat_rate);
   const Cycle walk(12, 0);
   add_clip(table, 45'000, [&](double t) { return walk(t / 45); });
   const RepeatAnalysis analysis = analyse_repeats(table);
@@ -178,7 +178,7 @@ TEST(rma_repeats, a_cycle_a_thousand_times_is_kept_a_few_times) {
 }
 
 TEST(rma_repeats, a_held_pose_is_one_unique_clip) {
-  FrameTable table = empty_table(12, rate);
+  FrameTable table = empty_table(12, repeat_rate);
   add_clip(table, 900, [](double /*t*/) { return Eigen::VectorXd::Constant(12, 1.5); });
   const RepeatAnalysis analysis = analyse_repeats(table);
   expect_sound(analysis, table);
@@ -189,7 +189,7 @@ TEST(rma_repeats, a_held_pose_is_one_unique_clip) {
 TEST(rma_repeats, short_motions_are_taken) {
   const Cycle walk(12, 0);
   for (const int frames : {1, 2, 10, 60}) {
-    FrameTable table = empty_table(12, rate);
+    FrameTable table = empty_table(12, repeat_rate);
     add_clip(table, frames, [&](double t) { return walk(t / 20); });
     expect_sound(analyse_repeats(table), table);
   }
@@ -197,7 +197,7 @@ TEST(rma_repeats, short_motions_are_taken) {
 
 TEST(rma_repeats, many_clips_of_one_frame_are_taken) {
   const Cycle walk(12, 0);
-  FrameTable table = empty_table(12, rate);
+  FrameTable table = empty_table(12, repeat_rate);
   for (int c = 0; c < 80; ++c) add_clip(table, 1, [&](double /*t*/) { return walk(c / 20.0); });
   expect_sound(analyse_repeats(table), table);
 }
@@ -205,7 +205,7 @@ TEST(rma_repeats, many_clips_of_one_frame_are_taken) {
 TEST(rma_repeats, no_clip_is_shorter_than_allowed_where_there_is_a_neighbour) {
   const FrameTable table = walks_between_other_things();
   const RepeatAnalysis analysis = analyse_repeats(table);
-  for (const RepeatClip& clip : analysis.clips) EXPECT_GE(clip.frames(), 0.2 * rate - 1);
+  for (const RepeatClip& clip : analysis.clips) EXPECT_GE(clip.frames(), 0.2 * repeat_rate - 1);
 }
 
 TEST(rma_repeats, the_number_of_threads_changes_nothing) {
@@ -226,7 +226,7 @@ TEST(rma_repeats, the_number_of_threads_changes_nothing) {
 }
 
 TEST(rma_repeats, a_table_too_large_is_looked_through_in_parts) {
-  FrameTable table = empty_table(12, rate);
+  FrameTable table = empty_table(12, repeat_rate);
   const Cycle walk(12, 0);
   for (int c = 0; c < 7; ++c) add_clip(table, 600, [&](double t) { return walk(t / 45); });
   const RepeatAnalysis analysis = analyse_repeats(table, {.table_frames = 200});

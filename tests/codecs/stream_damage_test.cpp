@@ -11,7 +11,7 @@ namespace kinespace {
 namespace {
 
 // True when the bytes gave clips.
-bool decodes(std::span<const std::byte> bytes) {
+bool stream_decodes(std::span<const std::byte> bytes) {
   try {
     const auto reader = open_stream(bytes, "damaged.ksm");
     for (std::size_t c = 0; c < reader->clips().size(); c += 5) {
@@ -37,7 +37,7 @@ TEST(StreamDamage, every_prefix_is_a_coarser_stream_or_an_error) {
   const std::uint64_t least = whole->stream().prefix_size("layers", 0);
   int decoded = 0;
   for (std::size_t n = 0; n < stream.size(); n += n < 64 ? 1 : 37) {
-    const bool good = decodes(std::span(stream).first(n));
+    const bool good = stream_decodes(std::span(stream).first(n));
     EXPECT_EQ(good, n >= least) << n;
     decoded += good ? 1 : 0;
   }
@@ -50,19 +50,19 @@ TEST(StreamDamage, huge_counts_in_a_small_stream_are_refused_before_anything_is_
   ClipEntry& clip = table.clips.front();
   clip.blocks.assign(40000, 512);  // 20 million frames
   clip.finer.assign(40000, 0);
-  EXPECT_FALSE(decodes(forged("clips", pack_clip_table(table))));
+  EXPECT_FALSE(stream_decodes(forged("clips", pack_clip_table(table))));
 
   MotionSpaceTables tables = unpack_motion_space_tables(
       stream.section("tables"), static_cast<int>(table.skeletons.front().rotating_joints().size()), "s");
   tables.basis.components = 4000;
-  EXPECT_FALSE(decodes(forged("tables", pack_motion_space_tables(tables))));
+  EXPECT_FALSE(stream_decodes(forged("tables", pack_motion_space_tables(tables))));
   tables.basis.components = static_cast<int>(tables.basis.exponents.size());
   tables.step = 1e300;
-  EXPECT_FALSE(decodes(forged("tables", pack_motion_space_tables(tables))));
+  EXPECT_FALSE(stream_decodes(forged("tables", pack_motion_space_tables(tables))));
 
   ByteWriter layer;
   put_varint(layer, std::uint64_t{1} << 62);
-  EXPECT_FALSE(decodes(forged("layers", std::move(layer).take())));
+  EXPECT_FALSE(stream_decodes(forged("layers", std::move(layer).take())));
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ Clip through_bvh(const Clip& clip) {
   return parse_bvh(format_bvh(clip), "again.bvh");
 }
 
-Clip through_acclaim(const Clip& clip) {
+Clip real_through_acclaim(const Clip& clip) {
   const AcclaimText text = format_amc(clip);
   return parse_amc(text.amc, parse_asf(text.asf, "again.asf"), "again.amc");
 }
@@ -59,7 +59,7 @@ TEST(RealData, every_file_goes_to_bvh_and_acclaim_and_back_within_1e_4_cm) {
     for (std::size_t i = next++; i < files.size(); i = next++) {
       const Clip clip = read_clip(files[i]);
       const Clip again = through_bvh(clip);
-      const Loss loss{largest_distance(clip, again), largest_distance_by_name(clip, through_acclaim(clip))};
+      const Loss loss{largest_distance(clip, again), largest_distance_by_name(clip, real_through_acclaim(clip))};
       const std::lock_guard lock(mutex);
       EXPECT_TRUE(again.skeleton.same_tree(clip.skeleton)) << files[i];
       EXPECT_EQ(again.rate_hz, clip.rate_hz) << files[i];

@@ -17,6 +17,7 @@
 namespace kinespace {
 namespace {
 
+using test::error_of;
 using test::fill_sample;
 using test::in_child;
 using test::TemporaryFolder;
@@ -29,16 +30,6 @@ std::vector<std::string> files_in(const std::filesystem::path& folder) {
   std::vector<std::string> names;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) names.push_back(entry.path().filename());
   return names;
-}
-
-Error error_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error;
-  }
-  ADD_FAILURE() << "no error";
-  return {ErrorKind::usage, {}};
 }
 
 void build_sample(const std::filesystem::path& path, int clips) {

@@ -17,6 +17,7 @@
 namespace kinespace {
 namespace {
 
+using test::error_of;
 using test::fill_sample;
 using test::in_child;
 using test::sample_blobs;
@@ -25,16 +26,6 @@ using test::TemporaryFolder;
 using test::to_bytes;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-Error error_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error;
-  }
-  ADD_FAILURE() << "no error";
-  return {ErrorKind::usage, {}};
-}
 
 class LibraryTest : public testing::Test {
  protected:

@@ -1,0 +1,1 @@
+// Nothing: a target that owns the shared precompiled header must have a source.
