@@ -4,6 +4,9 @@
 // disk (fsync) and then renamed over it, so a reader sees the old file or the new one, never half of either; a full
 // disk or a killed process leaves the old file as it was. A link stays a link to the file it names, a file that was
 // there keeps its permissions, and a device (/dev/null, a pipe) is written to as it is.
+//
+// The one rule of what may be overwritten: a file is put over none, over an empty one or over one of its own kind
+// (base/file_kind.h), never over another. That no command overwrites what it reads is held by cli/file_options.h.
 #pragma once
 
 #include <cstddef>
@@ -13,18 +16,21 @@
 #include <string>
 #include <string_view>
 
+#include "base/file_kind.h"
+
 namespace kinespace {
 
-// A read-only view of a file's bytes (memory-mapped; empty files give an empty view).
-class MappedFile {
+// The bytes of a file, in memory of their own: what happens to the file afterwards does not matter.
+class FileContent {
  public:
-  // Throws Error (bad_input when the file is missing or not a regular file, machine when it cannot be mapped).
-  explicit MappedFile(const std::filesystem::path& path);
-  ~MappedFile();
-  MappedFile(MappedFile&& other) noexcept;
-  MappedFile& operator=(MappedFile&& other) noexcept;
-  MappedFile(const MappedFile&) = delete;
-  MappedFile& operator=(const MappedFile&) = delete;
+  // Throws Error: bad_input when the file is missing, not a regular file, or changes its length while it is read;
+  // machine when it cannot be read or held.
+  explicit FileContent(const std::filesystem::path& path);
+  ~FileContent();
+  FileContent(FileContent&& other) noexcept;
+  FileContent& operator=(FileContent&& other) noexcept;
+  FileContent(const FileContent&) = delete;
+  FileContent& operator=(const FileContent&) = delete;
 
   [[nodiscard]] std::string_view text() const noexcept { return {data_, size_}; }
   [[nodiscard]] std::span<const std::byte> bytes() const noexcept {
@@ -32,13 +38,32 @@ class MappedFile {
   }
 
  private:
-  const char* data_ = nullptr;
+  FileContent() = default;
+  void read_whole(int fd, const std::filesystem::path& path);
+
+  char* data_ = nullptr;
   std::size_t size_ = 0;
 };
 
-// Replaces `path` by `content` in one step. Throws Error{machine} when that fails; then `path` is unchanged.
+// Replaces `path` by `content` in one step. Throws Error; then `path` is unchanged: machine when it cannot be written,
+// usage when a file of another kind is there.
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
+
+// Files that belong together, all or none: every one is complete and flushed before the first is put in its place, and
+// when one cannot be, those before it are taken back.
+struct FileToWrite {
+  std::filesystem::path path;
+  std::string_view content;
+};
+void write_files_atomically(std::span<const FileToWrite> files);
+
+// Throws Error{usage} when a file stands there that one of that kind may not be put over. Every writer asks; ask before
+// long work, too.
+void require_replaceable(const std::filesystem::path& path, FileKind kind);
+
+// Removes what killed processes left in a folder of what they were writing (.kinespace-PID-N...). Never fails.
+void remove_leftovers(const std::filesystem::path& folder);
 
 // Throws Error{usage} when `output` names the same existing file as `input`, by whatever path or link.
 void require_different_files(const std::filesystem::path& input, const std::filesystem::path& output);

@@ -29,7 +29,7 @@ constexpr int passes = 3;
 struct Corpus {
   std::string name;
   std::vector<std::filesystem::path> paths;
-  std::vector<MappedFile> texts;
+  std::vector<FileContent> texts;
   std::vector<Asf> skeletons;  // one a file, or none
   [[nodiscard]] Clip parse(std::size_t i) const {
     const std::string source = paths[i].string();
@@ -37,7 +37,7 @@ struct Corpus {
   }
   [[nodiscard]] double megabytes() const {
     double bytes = 0;
-    for (const MappedFile& text : texts) bytes += static_cast<double>(text.text().size());
+    for (const FileContent& text : texts) bytes += static_cast<double>(text.text().size());
     return bytes / 1e6;
   }
 };
@@ -122,7 +122,7 @@ void measure_speed(const Corpus& corpus, std::vector<BenchResult>& results) {
 }
 
 // The text of a clip that plays `times` times over.
-std::string repeated(const MappedFile& file, int frames, int times) {
+std::string repeated(const FileContent& file, int frames, int times) {
   const std::string_view text = file.text();
   const auto data = text.find('\n', text.find("Frame Time")) + 1;
   std::string out(text.substr(0, text.find("Frames:")));

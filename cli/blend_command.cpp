@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/synthesis_output.h"
+#include "motion/read.h"
 #include "synthesis/interpolation.h"
 
 namespace kinespace::cli {
@@ -20,7 +21,7 @@ struct BlendCommandOptions {
 };
 
 void run_blend(BlendCommandOptions options) {
-  require_no_overwriting(options.output, options.library);
+  static_cast<void>(files_written(options.output.file));  // an ending that cannot be written is told before the work
   if (!options.weights.empty()) options.blend.weights = options.weights;
   options.blend.functions = options.functions.value_or(-1);
   LibraryView library(options.library);
@@ -38,7 +39,7 @@ void run_blend(BlendCommandOptions options) {
 
 }  // namespace
 
-void add_blend(CLI::App& app, Session& /*session*/) {
+void add_blend(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("blend", "Interpolate motions: a Bezier curve through clips, or weights");
   const auto options = std::make_shared<BlendCommandOptions>();
   command->add_option("LIB", options->library, "The library")->required();
@@ -56,6 +57,9 @@ void add_blend(CLI::App& app, Session& /*session*/) {
   command->add_flag("--clean-feet", options->output.clean_feet, "Take foot skate out of the result");
   command->add_option("--picture", options->output.picture, "Also write stick figures, .svg");
   command->add_flag("--json", options->output.json, "Print the figures as one JSON object");
+  session.files.reads(command, {"LIB"});
+  session.files.writes(command, {"--output"});
+  session.files.writes(command, {"--picture"}, FileKind::svg);
   command->callback([options] { run_blend(*options); });
 }
 

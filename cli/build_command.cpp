@@ -47,6 +47,23 @@ Grouping grouping_of(const std::string& name) {
   return Grouping::all_together;
 }
 
+// A build that is stopped keeps what it has read.
+LibraryReport build_or_tell_what_stays(const std::vector<std::filesystem::path>& files, const BuildOptions& options,
+                                       const Compute& compute, Session& session) {
+  try {
+    return build_library(files, options.output, options.library, compute, session.progress());
+  } catch (const Interrupted&) {
+    const std::string partial = options.output.string() + ".partial";
+    std::error_code ignored;
+    if (std::filesystem::exists(partial, ignored)) {
+      session.when_stopped = fmt::format(
+          "stopped; {} is as it was, and {} keeps the clips that were read: the same command goes on from there",
+          options.output.string(), partial);
+    }
+    throw;
+  }
+}
+
 void run_build(BuildOptions options, Session& session) {
   const auto start = std::chrono::steady_clock::now();
   LibraryBuilderOptions& library = options.library;
@@ -57,7 +74,7 @@ void run_build(BuildOptions options, Session& session) {
   const Compute compute = Compute::open(options.device);
   const auto files = find_motion_files(options.inputs);
   session.detail(fmt::format("{} motion files", files.size()));
-  const LibraryReport report = build_library(files, options.output, library, compute, session.progress());
+  const LibraryReport report = build_or_tell_what_stays(files, options, compute, session);
   session.finish_progress();
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   const Json result = to_json(report, options.output, elapsed.count());
@@ -89,6 +106,8 @@ void add_build(CLI::App& app, Session& session) {
   command->add_flag("--no-align", options->no_align, "Leave the timing of sequences as it is");
   command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
   command->add_flag("--json", options->json, "Print the result as one JSON object");
+  session.files.reads(command, {"CLIPS", "--asf"});
+  session.files.writes(command, {"--output"}, FileKind::database);
   command->callback([options, &session] { run_build(*options, session); });
 }
 

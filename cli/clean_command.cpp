@@ -53,12 +53,7 @@ Json to_json(const CleanCommandOptions& options, const CleanResult& result) {
 }
 
 void run_clean(const CleanCommandOptions& options, Session& session) {
-  for (const auto& file : files_written(options.output)) {
-    for (const auto& source : files_read(options.input)) require_different_files(source, file);
-  }
-  if (options.picture) {
-    for (const auto& source : files_read(options.input)) require_different_files(source, *options.picture);
-  }
+  static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
   CleanOptions clean_options{.feet = options.feet.empty() ? FeetNames{} : FeetNames::parse(options.feet),
                              .floor_cm = options.floor_cm};
   std::optional<ContactModel> model;
@@ -89,6 +84,9 @@ void add_clean(CLI::App& app, Session& session) {
   command->add_option("--library", options->library, "Use the contact labels of this library (kinespace contacts)");
   command->add_option("--picture", options->picture, "Also write stick figures with the plants marked, .svg");
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
+  session.files.reads(command, {"IN", "--library"});
+  session.files.writes(command, {"--output"});
+  session.files.writes(command, {"--picture"}, FileKind::svg);
   command->callback([options, &session] { run_clean(*options, session); });
 }
 

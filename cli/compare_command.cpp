@@ -54,6 +54,7 @@ void add_compare(CLI::App& app, Session& session) {
   command->add_option("A", options->reference, "The reference: .bvh or .amc")->required();
   command->add_option("B", options->other, "The clip to judge; joints are matched by name")->required();
   command->add_flag("--json", options->json, "Print the measures as one JSON object");
+  session.files.reads(command, {"A", "B"});
   command->callback([options, &session] { run_compare(*options, session); });
 }
 

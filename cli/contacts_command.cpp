@@ -128,7 +128,7 @@ void run_next(const ContactsOptions& options) {
 }
 
 std::string text_of(const std::string& file) {
-  if (file != "-") return std::string(MappedFile(file).text());
+  if (file != "-") return std::string(FileContent(file).text());
   return {std::istreambuf_iterator<char>(std::cin), std::istreambuf_iterator<char>()};
 }
 
@@ -161,7 +161,7 @@ void run_contacts(const ContactsOptions& options) {
 
 }  // namespace
 
-void add_contacts(CLI::App& app, Session& /*session*/) {
+void add_contacts(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("contacts", "When feet are planted: find, and teach by labels");
   const auto options = std::make_shared<ContactsOptions>();
   command->add_option("CLIP", options->clip, "A file, .bvh or .amc, or a clip of the library");
@@ -173,6 +173,8 @@ void add_contacts(CLI::App& app, Session& /*session*/) {
   command->add_option("--from", options->from, "The labels: lines JOINT FIRST LAST; - is standard input")->needs(label);
   command->add_option("--feet", options->feet, "The ankle joints as LEFT,RIGHT; found by name and shape otherwise");
   command->add_flag("--json", options->json, "Print one JSON object");
+  session.files.reads(command, {"CLIP", "--from"});
+  session.files.updates(command, {"--library"});
   command->callback([options] { run_contacts(*options); });
 }
 

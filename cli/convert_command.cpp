@@ -19,15 +19,8 @@ struct ConvertOptions {
   bool json = false;
 };
 
-void require_inputs_survive(const ConvertOptions& options) {
-  const auto inputs = files_read(options.input, options.asf);
-  for (const auto& output : files_written(options.output)) {
-    for (const auto& input : inputs) require_different_files(input, output);
-  }
-}
-
 void convert(const ConvertOptions& options, Session& session) {
-  require_inputs_survive(options);
+  static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
   const Clip clip = read_clip(options.input, options.asf);
   Session::check_stop();
   write_clip(options.output, clip);
@@ -51,6 +44,8 @@ void add_convert(CLI::App& app, Session& session) {
   command->add_option("OUT", options->output, "Where to: .bvh, .amc (writes the .asf too), .glb or .gltf")->required();
   command->add_option("--asf", options->asf, "The skeleton of an .amc input");
   command->add_flag("--json", options->json, "Print what was written as JSON");
+  session.files.reads(command, {"IN", "--asf"});
+  session.files.writes(command, {"OUT"});
   command->callback([options, &session] { convert(*options, session); });
 }
 

@@ -122,7 +122,6 @@ void run_decode(const DecodeOptions& options) {
   double frames = 0;
   for (std::size_t c = 0; c < clips.size(); ++c) {
     Session::check_stop();
-    for (const auto& written : files_written(files[c])) require_different_files(options.stream, written);
     write_clip(files[c], clips[c]);
     frames += clips[c].frames;
   }
@@ -134,7 +133,7 @@ void run_decode(const DecodeOptions& options) {
 
 }  // namespace
 
-void add_decode(CLI::App& app, Session& /*session*/) {
+void add_decode(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("decode", "Clips out of a stream, all or one or a part of one");
   const auto options = std::make_shared<DecodeOptions>();
   command->add_option("IN", options->stream, "The stream (.ksm), whole or its beginning")->required();
@@ -153,6 +152,8 @@ void add_decode(CLI::App& app, Session& /*session*/) {
   command->add_option("--format", options->format, "Ending of the files in a folder")
       ->check(CLI::IsMember({".bvh", ".amc", ".glb", ".gltf"}));
   command->add_flag("--json", options->json, "Print what was decoded as one JSON object");
+  session.files.reads(command, {"IN", "--basis"});
+  session.files.writes(command, {"--output"});
   command->callback([options] { run_decode(*options); });
 }
 

@@ -58,13 +58,12 @@ std::vector<fs::path> input_files(const std::vector<fs::path>& inputs) {
   return out;
 }
 
-std::vector<Clip> read_clips(const std::vector<fs::path>& files, const fs::path& output, Progress progress) {
+std::vector<Clip> read_clips(const std::vector<fs::path>& files, const Progress& progress) {
   std::vector<Clip> out;
   std::map<std::string, int> names;
   for (std::size_t i = 0; i < files.size(); ++i) {
     progress.at("reading", static_cast<double>(i) / static_cast<double>(files.size()));
     Session::check_stop();
-    for (const auto& file : files_read(files[i])) require_different_files(file, output);
     out.push_back(read_clip(files[i]));
     // Two clips of one name could not be told apart when decoding.
     const int seen = ++names[out.back().name];
@@ -99,10 +98,9 @@ std::map<std::string, double, std::less<>> all_settings(const EncodeOptions& opt
 
 void run_encode(const EncodeOptions& options, Session& session) {
   const Progress progress = session.progress();
-  const std::vector<Clip> clips = read_clips(input_files(options.inputs), options.output, progress);
+  const std::vector<Clip> clips = read_clips(input_files(options.inputs), progress);
   std::optional<MotionSpaceBasis> basis;
   if (options.basis) {
-    require_different_files(*options.basis, options.output);
     basis = library_basis(*options.basis, clips.front().skeleton.tree_hash(), progress);
   }
   const CodecOptions codec_options{.target = options.target,
@@ -185,6 +183,8 @@ void add_encode(CLI::App& app, Session& session) {
           "List what the codecs can be set by: meaning (value when not set; range)")
       ->trigger_on_parse();
   command->add_flag("--json", options->json, "Print what was written as one JSON object");
+  session.files.reads(command, {"IN", "--basis"});
+  session.files.writes(command, {"--output"}, FileKind::stream);
   command->callback([options, &session] { run_encode(*options, session); });
 }
 

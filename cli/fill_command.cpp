@@ -115,12 +115,7 @@ void print_gaps(const FillResult& result, const FillModel& model) {
 }
 
 void run_fill(const FillCommandOptions& options, Session& session) {
-  std::vector<std::filesystem::path> written = files_written(options.output);
-  if (options.picture) written.push_back(*options.picture);
-  for (const auto& file : written) {
-    require_different_files(options.library, file);
-    for (const auto& read : files_read(options.input)) require_different_files(read, file);
-  }
+  static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
   if (options.from_s.has_value() != options.to_s.has_value()) {
     throw Error(ErrorKind::usage, {.found = "one of --from and --to", .expected = "both or none"});
   }
@@ -162,6 +157,9 @@ void add_fill(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--picture", options->picture, "Draw the first gap, slerp in grey behind it: .svg");
   command->add_flag("--json", options->json, "Print what was filled as one JSON object");
+  session.files.reads(command, {"IN", "--library"});
+  session.files.writes(command, {"--output"});
+  session.files.writes(command, {"--picture"}, FileKind::svg);
   command->callback([options, &session] { run_fill(*options, session); });
 }
 

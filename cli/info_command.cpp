@@ -64,7 +64,7 @@ Json describe_clip(const InfoOptions& options) {
 }
 
 bool is_library(const std::filesystem::path& file) {
-  return std::filesystem::is_regular_file(file) && Library::looks_like_library(MappedFile(file).bytes());
+  return std::filesystem::is_regular_file(file) && Library::looks_like_library(FileContent(file).bytes());
 }
 
 // A fact that the builder left, as a number; null where there is none.
@@ -121,7 +121,7 @@ Json describe_library(const InfoOptions& options) {
 }
 
 bool is_stream(const std::filesystem::path& file) {
-  return std::filesystem::is_regular_file(file) && Bitstream::has_magic(MappedFile(file).bytes());
+  return std::filesystem::is_regular_file(file) && Bitstream::has_magic(FileContent(file).bytes());
 }
 
 Json describe_stream(const InfoOptions& options) {
@@ -196,6 +196,8 @@ void add_info(CLI::App& app, Session& session) {
       "--repeats", options->repeats, "Which stretches of the clips repeat others (repeated motion analysis, lin2011)");
   command->add_option("--picture", options->picture, "With --repeats: an SVG of the self-distance table to write")
       ->needs(repeats);
+  session.files.reads(command, {"FILE", "--basis"});
+  session.files.writes(command, {"--picture"}, FileKind::svg);
   command->callback([options, &session] { run_info(*options, session); });
 }
 

@@ -1,9 +1,10 @@
 #include "cli/json_output.h"
 
 #include <algorithm>
-#include <cstdio>
 
 #include <fmt/format.h>
+
+#include "cli/output.h"
 
 namespace kinespace::cli {
 namespace {
@@ -19,7 +20,7 @@ std::string shown(const Json& value) {
 }  // namespace
 
 void print_json(const Json& object) {
-  fmt::print("{}\n", object.dump(2, ' ', false, Json::error_handler_t::replace));
+  print("{}\n", object.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
 void print_fields(const Json& object) {
@@ -28,7 +29,7 @@ void print_fields(const Json& object) {
   for (const auto& [key, value] : object.items()) {
     std::string name = key;
     std::replace(name.begin(), name.end(), '_', ' ');
-    fmt::print("{:<{}}  {}\n", name, width, shown(value));
+    print("{:<{}}  {}\n", name, width, shown(value));
   }
 }
 

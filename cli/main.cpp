@@ -1,11 +1,15 @@
 // The `kinespace` command: turns what the library throws into one line on standard error and an exit code.
 //
 //   0 done   1 the input is bad   2 usage   3 the machine could not   128 + N stopped by signal N (Ctrl-C: 130)
-#include <cstdio>
+#include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <string>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -13,6 +17,7 @@
 #include "base/error.h"
 #include "base/progress.h"
 #include "cli/commands.h"
+#include "cli/output.h"
 #include "cli/session.h"
 
 namespace {
@@ -25,7 +30,7 @@ constexpr const char* description =
     "level of detail, convert and compare clips.";
 
 int report(ErrorKind kind, const std::string& message) {
-  fmt::print(stderr, "kinespace: {}\n", message);
+  kinespace::cli::tell(message);
   return static_cast<int>(kind);
 }
 
@@ -35,7 +40,16 @@ std::string help_command(const CLI::App& app) {
   return chosen.empty() ? "kinespace --help" : fmt::format("kinespace {} --help", chosen.front()->get_name());
 }
 
-int run(CLI::App& app, int argc, char** argv) {
+// What the file system refused, by who can mend it: a path that leads nowhere is the user's.
+int report_system_error(const std::system_error& error, const std::string& path) {
+  constexpr std::array paths_fault = {ENOENT, ENOTDIR, ELOOP, ENAMETOOLONG, EACCES, EPERM, EISDIR, EEXIST};
+  const bool users = !path.empty() && std::ranges::find(paths_fault, error.code().value()) != paths_fault.end();
+  const std::string where = path.empty() ? "the machine, or the working folder" : path;
+  return report(users ? ErrorKind::bad_input : ErrorKind::machine,
+                kinespace::format_error({.file = where, .found = error.code().message()}));
+}
+
+int run(CLI::App& app, const kinespace::cli::Session& session, int argc, char** argv) {
   try {
     app.parse(argc, argv);
     return EXIT_SUCCESS;
@@ -46,11 +60,14 @@ int run(CLI::App& app, int argc, char** argv) {
   } catch (const kinespace::Error& error) {
     return report(error.kind(), error.what());
   } catch (const kinespace::Interrupted&) {
-    const int signal = kinespace::cli::stop_signal();
-    fmt::print(stderr, "kinespace: stopped; nothing half-written is left\n");
-    return 128 + signal;
+    kinespace::cli::tell(session.when_stopped);
+    return 128 + kinespace::cli::stop_signal();
   } catch (const std::bad_alloc&) {
     return report(ErrorKind::machine, "out of memory; close other programs or work on fewer clips at once");
+  } catch (const std::filesystem::filesystem_error& error) {
+    return report_system_error(error, error.path1().string());
+  } catch (const std::system_error& error) {  // no more threads, say
+    return report_system_error(error, {});
   } catch (const std::exception& error) {
     return report(ErrorKind::machine, fmt::format("unexpected error, please report it: {}", error.what()));
   }
@@ -58,7 +75,7 @@ int run(CLI::App& app, int argc, char** argv) {
 
 // A result that did not reach its reader is no result: a full disk behind `> file` must not pass as success.
 int flush_results(int code) {
-  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  if (kinespace::cli::finish_output()) return code;
   return report(ErrorKind::machine, "cannot write to standard output; is the disk full?");
 }
 
@@ -66,6 +83,7 @@ int flush_results(int code) {
 
 int main(int argc, char** argv) {
   try {
+    kinespace::cli::open_standard_descriptors();
     kinespace::cli::Session session;
     kinespace::cli::catch_stop_signals();
     CLI::App app{description, "kinespace"};
@@ -75,7 +93,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     app.fallthrough();  // global options may also stand after the subcommand
     kinespace::cli::add_all_commands(app, session);
-    const int code = run(app, argc, argv);
+    const int code = run(app, session, argc, argv);
     session.finish_progress();
     return flush_results(code);
   } catch (const std::exception& error) {

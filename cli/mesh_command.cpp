@@ -31,7 +31,7 @@ double seconds_since(Clock::time_point start) {
 bool is_stream_file(const fs::path& path) {
   std::error_code error;
   if (!fs::is_regular_file(path, error)) return false;
-  const MappedFile file(path);
+  const FileContent file(path);
   return is_mesh_stream(file.bytes());
 }
 
@@ -62,7 +62,7 @@ void add_library(CLI::App& command, std::optional<fs::path>& library) {
 // A sequence of files, or of a stream.
 MeshSequence read_any(const fs::path& path, const std::optional<fs::path>& library, Session& session) {
   if (!is_stream_file(path)) return read_mesh_sequence(path);
-  const MappedFile file(path);
+  const FileContent file(path);
   return OpenStream(file.bytes(), path, library, session)->decode_all();
 }
 
@@ -103,7 +103,6 @@ struct MeshEncodeOptions {
 };
 
 void run_encode(MeshEncodeOptions& options, Session& session) {
-  require_different_files(options.input, options.output);
   const MeshSequence mesh = read_mesh_sequence(options.input, options.rate_hz);
   options.codec_options.profile = options.profile == "paper" ? MeshProfile::paper : MeshProfile::standard;
   options.codec_options.progress = session.progress();
@@ -136,8 +135,7 @@ MeshFormat format_of(const fs::path& output, const std::string& format) {
 }
 
 void run_decode(const MeshDecodeOptions& options, const std::string& format, Session& session) {
-  require_different_files(options.stream, options.output);
-  const MappedFile file(options.stream);
+  const FileContent file(options.stream);
   const auto start = Clock::now();
   const OpenStream reader(file.bytes(), options.stream, options.library, session);
   const double opened = seconds_since(start);
@@ -201,7 +199,7 @@ void run_compare(const MeshCompareOptions& options, Session& session) {
               {"max_vertex_error", error.max_vertex_error},
               {"max_error_over_diagonal", error.max_error_over_diagonal}};
   if (is_stream_file(options.other)) {
-    const MappedFile file(options.other);
+    const FileContent file(options.other);
     const OpenStream reader(file.bytes(), options.other, options.library, session);
     const auto bytes = static_cast<std::int64_t>(file.bytes().size());
     result["bytes"] = bytes;
@@ -247,7 +245,7 @@ Json describe_sequence(const fs::path& path) {
 
 void run_info(const MeshInfoOptions& options) {
   if (!is_stream_file(options.file)) return print(describe_sequence(options.file), options.json);
-  const MappedFile file(options.file);
+  const FileContent file(options.file);
   const auto reader = open_mesh_stream(file.bytes(), options.file.string());
   const std::string& kind = reader->stream().kind();
   Json result{{"kind", "mesh"}, {"codec", kind.substr(kind.find(':') + 1)}, {"rate_hz", reader->layout().rate_hz}};
@@ -277,6 +275,9 @@ void add_mesh_encode(CLI::App& mesh, Session& session) {
   command->add_option("--rate", options->rate_hz, "Frames a second, where the files do not tell");
   add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
+  session.files.reads(command, {"IN"});
+  session.files.updates(command, {"--library"});
+  session.files.writes(command, {"--output"}, FileKind::stream);
   command->callback([options, &session] { run_encode(*options, session); });
 }
 
@@ -293,6 +294,9 @@ void add_mesh_decode(CLI::App& mesh, Session& session) {
   command->add_option("--to", options->to, "The last frame");
   add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
+  session.files.reads(command, {"IN"});
+  session.files.updates(command, {"--library"});
+  session.files.writes(command, {"--output"});
   command->callback([options, format, &session] { run_decode(*options, *format, session); });
 }
 
@@ -305,14 +309,18 @@ void add_mesh_compare(CLI::App& mesh, Session& session) {
   command->add_option("--frame", options->frame, "The frame to draw; by default the one with the largest error");
   add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the measures as one JSON object");
+  session.files.reads(command, {"A", "B"});
+  session.files.updates(command, {"--library"});
+  session.files.writes(command, {"--picture"}, FileKind::png);
   command->callback([options, &session] { run_compare(*options, session); });
 }
 
-void add_mesh_info(CLI::App& mesh) {
+void add_mesh_info(CLI::App& mesh, Session& session) {
   CLI::App* command = mesh.add_subcommand("info", "What a mesh sequence or a stream of one holds");
   const auto options = std::make_shared<MeshInfoOptions>();
   command->add_option("FILE", options->file, "Files of a sequence, or a stream")->required();
   command->add_flag("--json", options->json, "Print the result as one JSON object");
+  session.files.reads(command, {"FILE"});
   command->callback([options] { run_info(*options); });
 }
 
@@ -324,7 +332,7 @@ void add_mesh(CLI::App& app, Session& session) {
   add_mesh_encode(*mesh, session);
   add_mesh_decode(*mesh, session);
   add_mesh_compare(*mesh, session);
-  add_mesh_info(*mesh);
+  add_mesh_info(*mesh, session);
 }
 
 }  // namespace kinespace::cli

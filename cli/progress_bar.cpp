@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "cli/output.h"
+
 namespace kinespace::cli {
 namespace {
 
@@ -32,7 +34,7 @@ ProgressBar::ProgressBar(std::FILE* out, bool terminal, Clock::duration every)
     : out_(out), terminal_(terminal), every_(every) {}
 
 ProgressBar::~ProgressBar() {
-  if (open_line_) std::fputc('\n', out_);
+  if (open_line_) write_text(out_, "\n");
 }
 
 void ProgressBar::show(std::string_view stage, double done) {
@@ -51,15 +53,15 @@ void ProgressBar::show(std::string_view stage, double done) {
 }
 
 void ProgressBar::draw_bar(std::string_view stage, int percent) {
-  if (open_line_ && stage != stage_) fmt::print(out_, "\n");
+  if (open_line_ && stage != stage_) write_text(out_, "\n");
   const int filled = percent * bar_width / 100;
-  fmt::print(out_, "\r{:<24} [{:#<{}}{:.<{}}] {:3} %", stage, "", filled, "", bar_width - filled, percent);
+  write_text(out_, fmt::format("\r{:<24} [{:#<{}}{:.<{}}] {:3} %", stage, "", filled, "", bar_width - filled, percent));
   std::fflush(out_);
   open_line_ = true;
 }
 
 void ProgressBar::draw_line(std::string_view stage, int percent) {
-  fmt::print(out_, "kinespace: {} {} %\n", stage, percent);
+  write_text(out_, fmt::format("kinespace: {} {} %\n", stage, percent));
   std::fflush(out_);
 }
 

@@ -87,7 +87,7 @@ void run_query(QueryCommandOptions options) {
 
 }  // namespace
 
-void add_query(CLI::App& app, Session& /*session*/) {
+void add_query(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("query", "The motions of a library that are nearest to a clip");
   const auto options = std::make_shared<QueryCommandOptions>();
   command->add_option("LIB", options->library, "The library")->required();
@@ -108,6 +108,7 @@ void add_query(CLI::App& app, Session& /*session*/) {
       ->needs(windows);
   command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
   command->add_flag("--json", options->json, "Print the matches as one JSON object");
+  session.files.reads(command, {"LIB", "CLIP"});
   command->callback([options] { run_query(*options); });
 }
 

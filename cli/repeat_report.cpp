@@ -26,9 +26,6 @@ std::vector<Clip> read_clips(const RepeatReportOptions& options, const Progress&
   for (std::size_t i = 0; i < files.size(); ++i) {
     progress.at("reading", static_cast<double>(i) / static_cast<double>(files.size()));
     Session::check_stop();
-    if (options.picture) {
-      for (const auto& file : files_read(files[i])) require_different_files(file, *options.picture);
-    }
     out.push_back(read_clip(files[i]));
     if (out.back().rate_hz == out.front().rate_hz) continue;
     throw Error(ErrorKind::bad_input,

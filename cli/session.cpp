@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <system_error>
 
-#include <fmt/format.h>
+#include "cli/output.h"
 
 namespace kinespace::cli {
 namespace {
@@ -61,7 +61,7 @@ Progress Session::progress() {
 
 void Session::note(std::string_view text) {
   finish_progress();
-  if (!quiet) fmt::print(stderr, "kinespace: {}\n", text);
+  if (!quiet) tell(text);
 }
 
 void Session::detail(std::string_view text) {

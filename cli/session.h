@@ -2,9 +2,11 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <string_view>
 
 #include "base/progress.h"
+#include "cli/file_options.h"
 #include "cli/progress_bar.h"
 
 namespace kinespace::cli {
@@ -21,6 +23,10 @@ class Session {
  public:
   bool quiet = false;    // no progress and no notes, only results and errors
   bool verbose = false;  // more notes
+
+  FileOptions files;  // which options name files
+  // What is told when a signal has stopped the work.
+  std::string when_stopped = "stopped; nothing half-written is left";
 
   // For the library's long calls: reports to the bar (unless quiet) and stops on a signal. It must not outlive the
   // session.

@@ -19,7 +19,7 @@ class StreamFile {
   [[nodiscard]] std::size_t bytes() const { return file_.bytes().size(); }
 
  private:
-  MappedFile file_;
+  FileContent file_;
   std::unique_ptr<StreamReader> reader_;
 };
 

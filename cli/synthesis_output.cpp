@@ -7,11 +7,6 @@
 
 namespace kinespace::cli {
 
-void require_no_overwriting(const SynthesisOutput& output, const std::filesystem::path& library) {
-  for (const auto& file : files_written(output.file)) require_different_files(library, file);
-  if (output.picture) require_different_files(library, *output.picture);
-}
-
 void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result) {
   StripOptions strip{.title = clip.name, .bands = bands};
   Json feet;

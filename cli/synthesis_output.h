@@ -18,9 +18,6 @@ struct SynthesisOutput {
   bool json = false;
 };
 
-// Neither the motion nor its picture may be the library itself.
-void require_no_overwriting(const SynthesisOutput& output, const std::filesystem::path& library);
-
 // Cleans the feet when asked, writes the motion and the picture, and adds to `result`: output, frames, duration_s,
 // rate_hz, and what the cleanup did. `bands`: what to mark in the picture.
 void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result);

@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/synthesis_output.h"
+#include "motion/read.h"
 #include "synthesis/transition_plan.h"
 
 namespace kinespace::cli {
@@ -74,7 +75,7 @@ std::vector<StripBand> bands_of(const PlannedTransition& plan) {
 }
 
 void run_transition(const TransitionCommandOptions& options, Session& session) {
-  require_no_overwriting(options.output, options.library);
+  static_cast<void>(files_written(options.output.file));  // an ending that cannot be written is told before the work
   LibraryView library(options.library);
   const auto plan = plan_transition(library, options.clips, options.plan, session.progress());
   session.finish_progress();
@@ -110,6 +111,9 @@ void add_transition(CLI::App& app, Session& session) {
   command->add_flag("--clean-feet", options->output.clean_feet, "Take foot skate out of the result");
   command->add_option("--picture", options->output.picture, "Also write stick figures with the seams marked, .svg");
   command->add_flag("--json", options->output.json, "Print the figures as one JSON object");
+  session.files.updates(command, {"LIB"});  // the graph is kept in it
+  session.files.writes(command, {"--output"});
+  session.files.writes(command, {"--picture"}, FileKind::svg);
   command->callback([options, &session] { run_transition(*options, session); });
 }
 

@@ -53,7 +53,7 @@ double parse_number(std::string_view text, const fs::path& file, std::int64_t li
 }
 
 Eigen::MatrixXd read_table(const fs::path& file) {
-  const MappedFile mapped(file);
+  const FileContent mapped(file);
   std::vector<double> values;
   std::size_t columns = 0, rows = 0;
   each_line(mapped.text(), [&](std::string_view line, std::int64_t number) {
@@ -77,7 +77,7 @@ Eigen::MatrixXd read_table(const fs::path& file) {
 
 // "name = value" or "name,value" lines.
 std::map<std::string, std::string> read_pairs(const fs::path& file, char separator) {
-  const MappedFile mapped(file);
+  const FileContent mapped(file);
   std::map<std::string, std::string> out;
   each_line(mapped.text(), [&](std::string_view line, std::int64_t number) {
     const auto at = line.find(separator);

@@ -40,7 +40,7 @@ struct Import {
 
 std::string hash_of(const std::filesystem::path& file, const std::optional<std::filesystem::path>& asf) {
   std::string hash;
-  for (const auto& part : files_read(file, asf)) hash += content_hash(MappedFile(part).bytes());
+  for (const auto& part : files_read(file, asf)) hash += content_hash(FileContent(part).bytes());
   return hash;
 }
 
@@ -59,21 +59,23 @@ bool import_file(Import& import, const LibraryBuilderOptions& options, LibraryBu
 
 int import_files(std::vector<Import>& imports, const LibraryBuilderOptions& options, LibraryBuild& build,
                  const Progress& progress) {
-  int resumed = 0;
+  // Of an earlier build only: two files of one content in this one are no resuming.
+  const std::vector<std::string> keys = build.import_keys();
+  const std::set<std::string> from_before(keys.begin(), keys.end());
+  std::vector<char> known(imports.size(), 0);
   const int count = static_cast<int>(imports.size());
   for (int start = 0; start < count; start += clips_per_block) {
     progress.check_stop();
     progress.at("import", static_cast<double>(start) / count);
     const int in_block = std::min(clips_per_block, count - start);
-    std::vector<char> known(static_cast<std::size_t>(in_block), 0);
     tbb::parallel_for(0, in_block, [&](int i) {
-      const bool was_there = import_file(imports[static_cast<std::size_t>(start + i)], options, build);
-      known[static_cast<std::size_t>(i)] = was_there ? 1 : 0;
+      Import& import = imports[static_cast<std::size_t>(start + i)];
+      const bool was_there = import_file(import, options, build);
+      known[static_cast<std::size_t>(start + i)] = was_there && from_before.contains(import.source_hash) ? 1 : 0;
     });
-    resumed += static_cast<int>(std::ranges::count(known, 1));
   }
   progress.at("import", 1);
-  return resumed;
+  return static_cast<int>(std::ranges::count(known, 1));
 }
 
 PreparedSource source_of_imports(const std::vector<const Import*>& imports, const LibraryBuild& build) {

@@ -1,6 +1,7 @@
 #include "mesh/mesh_files.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cmath>
@@ -98,7 +99,7 @@ MeshSequence read_frames(const std::vector<fs::path>& files, ParseFrame parse) {
   std::error_code ignored;
   for (const fs::path& file : files) bytes += fs::file_size(file, ignored);
   for (std::size_t f = 0; f < files.size(); ++f) {
-    const MappedFile mapped(files[f]);
+    const FileContent mapped(files[f]);
     MeshFrame frame = parse(mapped.text(), files[f].string());
     if (f == 0) {
       out.vertices = static_cast<int>(frame.positions.size() / 3);
@@ -135,7 +136,7 @@ MeshSequence read_any(const fs::path& path, std::optional<double> rate_hz) {
   if (has_ending(path, ".obj")) return read_frames({path}, parse_obj);
   if (has_ending(path, ".ply")) return read_frames({path}, parse_ply);
   if (has_ending(path, ".gltf") || has_ending(path, ".glb")) {
-    const MappedFile file(path);
+    const FileContent file(path);
     return parse_gltf_mesh(file.text(), path, rate_hz);
   }
   if (!fs::exists(path, ignored)) fail(ErrorKind::bad_input, path, "no such file or folder", "a mesh sequence");
@@ -175,8 +176,10 @@ class FolderInTheMaking {
 
 void fill_folder(const fs::path& folder, const MeshSequence& mesh, MeshFormat format) {
   if (format == MeshFormat::numpy) {
-    write_file_atomically(folder / triangles_name, format_numpy_triangles(mesh.triangles));
-    write_file_atomically(folder / positions_name, format_numpy_positions(mesh));
+    const std::string triangles = format_numpy_triangles(mesh.triangles), positions = format_numpy_positions(mesh);
+    const std::array files = {FileToWrite{folder / triangles_name, triangles},
+                              FileToWrite{folder / positions_name, positions}};
+    write_files_atomically(files);
     return;
   }
   const bool obj = format == MeshFormat::obj;
@@ -200,7 +203,7 @@ bool holds_only_numpy(const fs::path& folder) {
 }  // namespace
 
 MeshSequence read_numpy_mesh(const fs::path& positions, const fs::path& triangles, std::optional<double> rate_hz) {
-  const MappedFile numbers(positions), indices(triangles);
+  const FileContent numbers(positions), indices(triangles);
   MeshSequence out = parse_numpy(numbers.text(), positions.string(), indices.text(), triangles.string());
   out.name = positions.parent_path().filename().string();
   if (rate_hz) out.rate_hz = *rate_hz;

@@ -323,7 +323,7 @@ Clip parse_amc(std::string_view text, const Asf& asf, const std::string& source_
 
 Clip read_amc(const std::filesystem::path& amc, const std::filesystem::path& asf) {
   const Asf skeleton = read_asf(asf);
-  const MappedFile file(amc);
+  const FileContent file(amc);
   return parse_amc(file.text(), skeleton, amc.string());
 }
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <string>
 #include <unordered_set>
@@ -225,8 +226,9 @@ AcclaimText format_amc(const Clip& clip) {
 
 void write_amc(const std::filesystem::path& amc, const Clip& clip) {
   const AcclaimText text = format_amc(clip);
-  write_file_atomically(std::filesystem::path(amc).replace_extension(".asf"), text.asf);
-  write_file_atomically(amc, text.amc);
+  const std::array files = {FileToWrite{std::filesystem::path(amc).replace_extension(".asf"), text.asf},
+                            FileToWrite{amc, text.amc}};
+  write_files_atomically(files);
 }
 
 }  // namespace kinespace

@@ -319,7 +319,7 @@ Asf parse_asf(std::string_view text, const std::string& source_name) {
 }
 
 Asf read_asf(const std::filesystem::path& path) {
-  const MappedFile file(path);
+  const FileContent file(path);
   return parse_asf(file.text(), path.string());
 }
 

@@ -176,7 +176,7 @@ Clip parse_bvh(std::string_view text, const std::string& source_name) {
 }
 
 Clip read_bvh(const std::filesystem::path& path) {
-  return parse_bvh(MappedFile(path).text(), path.string());
+  return parse_bvh(FileContent(path).text(), path.string());
 }
 
 }  // namespace kinespace

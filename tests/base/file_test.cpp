@@ -1,7 +1,10 @@
 #include "base/file.h"
 
+#include <array>
+#include <atomic>
 #include <csignal>
 #include <functional>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -44,7 +47,7 @@ mode_t mode_of(const std::filesystem::path& path) {
 }
 
 std::string text_of(const std::filesystem::path& path) {
-  return std::string(MappedFile(path).text());
+  return std::string(FileContent(path).text());
 }
 
 TEST(File, what_was_written_is_read) {
@@ -60,11 +63,11 @@ TEST(File, what_was_written_is_read) {
 TEST(File, a_view_outlives_a_move_and_the_replacing_of_its_file) {
   const TemporaryFolder folder;
   write_file_atomically(folder / "a", std::string_view("old"));
-  MappedFile file(folder / "a");
+  FileContent file(folder / "a");
   write_file_atomically(folder / "a", std::string_view("new, longer"));
-  MappedFile moved = std::move(file);
+  FileContent moved = std::move(file);
   EXPECT_EQ(moved.text(), "old");
-  moved = MappedFile(folder / "a");
+  moved = FileContent(folder / "a");
   EXPECT_EQ(moved.text(), "new, longer");
   EXPECT_EQ(moved.bytes().size(), 11U);
 }
@@ -73,7 +76,7 @@ TEST(File, what_cannot_be_read_is_bad_input_with_its_name) {
   const TemporaryFolder folder;
   ASSERT_EQ(::mkfifo((folder / "pipe").c_str(), 0600), 0);
   for (const char* name : {"missing", "pipe", "."}) {
-    const Error error = error_of([&] { MappedFile file(folder / name); });
+    const Error error = error_of([&] { FileContent file(folder / name); });
     EXPECT_EQ(error.kind(), ErrorKind::bad_input) << name;
     EXPECT_THAT(error.what(), HasSubstr(name));
   }
@@ -184,6 +187,79 @@ TEST(File, hashes_are_those_of_xxh3_and_tell_contents_apart) {
   const auto bytes = std::as_bytes(std::span(text));
   EXPECT_NE(content_hash(bytes), content_hash(bytes.first(8)));
   EXPECT_EQ(content_hash(bytes).size(), 32U);
+}
+
+constexpr std::string_view some_bvh = "HIERARCHY\nROOT a\n";
+constexpr std::string_view some_svg = "<svg xmlns='http://www.w3.org/2000/svg'/>";
+
+TEST(File, a_file_is_put_over_its_own_kind_or_an_empty_one_only) {
+  const TemporaryFolder folder;
+  const auto path = folder / "a";
+  write_file_atomically(path, std::string_view());
+  write_file_atomically(path, some_bvh);
+  const Error error = error_of([&] { write_file_atomically(path, some_svg); });
+  EXPECT_EQ(error.kind(), ErrorKind::usage);
+  EXPECT_THAT(error.what(), HasSubstr("a BVH motion of that name, expected no file, or an SVG picture"));
+  EXPECT_EQ(text_of(path), some_bvh);
+  write_file_atomically(path, std::string_view("HIERARCHY\nROOT b\n"));
+  EXPECT_EQ(text_of(path), "HIERARCHY\nROOT b\n");
+}
+
+TEST(File, files_that_belong_together_are_all_there_or_none) {
+  const TemporaryFolder folder;
+  write_file_atomically(folder / "a.asf", std::string_view(":version 1.10\nold"));
+  std::filesystem::create_directory(folder / "a.amc");  // nothing can be renamed over a folder
+  const std::array files = {FileToWrite{folder / "a.asf", ":version 1.10\nnew"},
+                            FileToWrite{folder / "a.amc", ":FULLY-SPECIFIED\nnew"},
+                            FileToWrite{folder / "b.amc", ":FULLY-SPECIFIED\nnew"}};
+  EXPECT_EQ(error_of([&] { write_files_atomically(files); }).kind(), ErrorKind::machine);
+  EXPECT_EQ(text_of(folder / "a.asf"), ":version 1.10\nold");
+  EXPECT_THAT(files_in(folder.path()), testing::UnorderedElementsAre("a.asf", "a.amc")) << "nothing else is left";
+  std::filesystem::remove(folder / "a.amc");
+  write_files_atomically(files);
+  EXPECT_EQ(text_of(folder / "a.asf"), ":version 1.10\nnew");
+  EXPECT_THAT(files_in(folder.path()), testing::UnorderedElementsAre("a.asf", "a.amc", "b.amc"));
+}
+
+// A file whose end is cut off while it is read: another thread does nothing else.
+TEST(File, a_file_that_changes_its_length_while_it_is_read_is_an_error_or_is_read_whole) {
+  const TemporaryFolder folder;
+  const auto path = folder / "a";
+  const std::string content(std::size_t{8} << 20, 'x');
+  write_file_atomically(path, content);
+  std::atomic<bool> stop{false};
+  std::thread cutter([&] {
+    for (std::uint64_t size = 0; !stop; size = (size + 4'093'082'899U) % content.size()) {
+      ASSERT_EQ(::truncate(path.c_str(), static_cast<off_t>(size)), 0);
+    }
+  });
+  int refused = 0;
+  for (int i = 0; i < 2000 && refused < 3; ++i) {
+    try {
+      const FileContent read(path);
+      for (const char c : read.text()) ASSERT_TRUE(c == 'x' || c == '\0');
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+      EXPECT_THAT(error.what(), HasSubstr("stays as it is while it is read"));
+      ++refused;
+    }
+  }
+  stop = true;
+  cutter.join();
+  EXPECT_GT(refused, 0);
+}
+
+TEST(FileKind, is_told_by_how_a_file_begins) {
+  const auto kind = [](std::string_view text) { return file_kind(std::as_bytes(std::span(text))); };
+  EXPECT_EQ(kind(""), FileKind::empty);
+  EXPECT_EQ(kind(std::string_view("SQLite format 3\0", 16)), FileKind::database);
+  EXPECT_EQ(kind("\xef\xbb\xbf  hierarchy\n"), FileKind::bvh);
+  EXPECT_EQ(kind("# made by hand\n:version 1.10"), FileKind::asf);
+  EXPECT_EQ(kind(":FULLY-SPECIFIED\n"), FileKind::amc);
+  EXPECT_EQ(kind("# frame\nv 1 2 3"), FileKind::obj);
+  EXPECT_EQ(kind("{\"asset\": 1}"), FileKind::json);
+  EXPECT_EQ(kind("#"), FileKind::other);
+  EXPECT_EQ(kind("vertical lines"), FileKind::other);
 }
 
 }  // namespace

@@ -62,7 +62,9 @@ Command::Command(const std::vector<std::string>& arguments, const CommandOptions
   std::string name = (std::filesystem::temp_directory_path() / "kinespace-run-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) throw std::system_error(errno, std::generic_category(), name);
   folder_ = name;
-  std::vector<std::string> words{KINESPACE_COMMAND};
+  std::vector<std::string> words;
+  if (!options.shell.empty()) words = {"/bin/sh", "-c", options.shell, "sh"};
+  words.emplace_back(KINESPACE_COMMAND);
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<std::string> environment = environment_with(options.environment);
   const std::string out = options.output_to.empty() ? (folder_ / "out").string() : options.output_to;

@@ -19,7 +19,8 @@ struct CommandResult {
 
 struct CommandOptions {
   std::vector<std::string> environment;  // "NAME=value", beside the test's own
-  std::string output_to;                 // a file or device for standard output; empty: captured
+  std::string output_to = {};            // a file or device for standard output; empty: captured
+  std::string shell = {};                // a line of shell that runs it, as "$@"; empty: none
 };
 
 // A started command; finish() waits for it.

@@ -19,7 +19,7 @@ INSTANTIATE_TEST_SUITE_P(All, FixedMeshStream, testing::ValuesIn(mesh_fixtures()
                          [](const auto& fixture) { return fixture.param.name; });
 
 TEST_P(FixedMeshStream, decodes_to_the_same_bits_in_every_build) {
-  const MappedFile file(GetParam().path());
+  const FileContent file(GetParam().path());
   for (const std::size_t threads : {1U, 3U}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     const MeshSequence decoded = open_mesh_stream(file.bytes(), GetParam().path().string())->decode_all();

@@ -61,7 +61,7 @@ TEST(Bitstream, what_was_written_comes_back) {
 
 TEST(Bitstream, a_stream_of_the_first_version_is_still_read) {
   const std::filesystem::path path = std::filesystem::path(KINESPACE_FIXTURES) / "bitstream_v1.ksm";
-  const MappedFile file(path);
+  const FileContent file(path);
   const Bitstream stream = Bitstream::parse(file.bytes(), path.string());
   EXPECT_EQ(stream.version(), 1U);
   expect_sample(stream);
@@ -71,7 +71,7 @@ TEST(Bitstream, a_stream_of_the_first_version_is_still_read) {
 // Holds the layout: a change of it needs a new version and a new fixture beside the old one.
 TEST(Bitstream, the_newest_version_writes_its_fixture_to_the_byte) {
   ASSERT_EQ(BitstreamVersion::newest, BitstreamVersion::first);
-  const MappedFile file(std::filesystem::path(KINESPACE_FIXTURES) / "bitstream_v1.ksm");
+  const FileContent file(std::filesystem::path(KINESPACE_FIXTURES) / "bitstream_v1.ksm");
   EXPECT_EQ(copy(file.bytes()), sample_stream());
 }
 

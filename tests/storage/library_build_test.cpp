@@ -103,7 +103,7 @@ TEST_F(LibraryBuildTest, a_damaged_partial_file_costs_the_imports_and_nothing_el
     LibraryBuild build(target_, {.fingerprint = "f"});
     for (int i = 0; i < 20; ++i) build.keep_import(std::to_string(i), Bytes(3000, static_cast<std::byte>(i)));
     build.checkpoint();
-    const MappedFile file(partial);
+    const FileContent file(partial);
     good.assign(file.bytes().begin(), file.bytes().end());
   }
   for (std::size_t at = 0; at < good.size(); at += 297) {
@@ -165,7 +165,7 @@ TEST_F(LibraryBuildTest, a_file_of_another_sort_is_never_overwritten) {
   const Error error = error_of([&] { build_sample(clip, 1); });
   EXPECT_EQ(error.kind(), ErrorKind::usage);
   EXPECT_THAT(error.what(), HasSubstr("walk.bvh"));
-  EXPECT_EQ(MappedFile(clip).text(), "HIERARCHY\n");
+  EXPECT_EQ(FileContent(clip).text(), "HIERARCHY\n");
   EXPECT_EQ(error_of([&] { build_sample(folder_.path(), 1); }).kind(), ErrorKind::usage);
 }
 

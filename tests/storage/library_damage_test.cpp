@@ -23,7 +23,7 @@ class LibraryDamage : public testing::Test {
       // Blobs larger than a page, so that there are overflow chains to break.
       test::fill_sample(library, 12, 6000, 64);
     }
-    const MappedFile file(path);
+    const FileContent file(path);
     good_.assign(file.bytes().begin(), file.bytes().end());
   }
 

@@ -239,7 +239,7 @@ TEST_F(LibraryTest, a_library_is_not_created_over_a_file) {
 }
 
 TEST_F(LibraryTest, its_first_bytes_tell_it_from_other_files) {
-  EXPECT_TRUE(Library::looks_like_library(MappedFile(library_.path()).bytes()));
+  EXPECT_TRUE(Library::looks_like_library(FileContent(library_.path()).bytes()));
   EXPECT_FALSE(Library::looks_like_library(to_bytes("HIERARCHY")));
   EXPECT_FALSE(Library::looks_like_library({}));
 }
