@@ -40,7 +40,9 @@ function(kinespace_module name)
 endfunction()
 
 # kinespace_precompile(TARGET): the headers that most of our translation units pay for, parsed once for all libraries.
-add_library(kinespace_precompiled OBJECT ${PROJECT_SOURCE_DIR}/cmake/precompiled.cpp)
+set(KINESPACE_NO_SOURCE ${PROJECT_BINARY_DIR}/generated/none.cpp)
+file(CONFIGURE OUTPUT ${KINESPACE_NO_SOURCE} CONTENT "// The owner of a precompiled header must have a source.\n")
+add_library(kinespace_precompiled OBJECT ${KINESPACE_NO_SOURCE})
 set_target_properties(kinespace_precompiled PROPERTIES POSITION_INDEPENDENT_CODE ON UNITY_BUILD OFF)
 target_compile_features(kinespace_precompiled PRIVATE cxx_std_20)
 target_link_libraries(kinespace_precompiled PRIVATE kinespace_build_flags Eigen3::Eigen fmt::fmt)
