@@ -51,18 +51,22 @@ bool same_place(const fs::path& a, const fs::path& b) {
   return !code && first.lexically_normal() == second.lexically_normal();
 }
 
-// Before the work, not after it.
-void require_place_for(const fs::path& output, std::optional<FileKind> kind) {
-  std::error_code ignored;
-  if (!kind) kind = kind_by_ending(output);
-  if (kind && !fs::is_directory(output, ignored)) require_replaceable(output, *kind);
-}
-
 [[noreturn]] void refuse(const fs::path& output, std::string found, std::string expected) {
   throw Error(ErrorKind::usage, {.file = output.string(),
                                  .found = std::move(found),
                                  .expected = std::move(expected),
                                  .remedy = "give another output name"});
+}
+
+// Before the work, not after it.
+void require_place_for(const fs::path& output, std::optional<FileKind> kind) {
+  std::error_code ignored;
+  if (fs::is_directory(output, ignored)) return;
+  if (!kind) kind = kind_by_ending(output);
+  if (kind) return require_replaceable(output, *kind);
+  if (fs::is_regular_file(output, ignored)) {
+    refuse(output, "a file", "a folder, or a name with the ending of what is to be written");
+  }
 }
 
 }  // namespace
@@ -111,7 +115,7 @@ void FileOptions::check(const CLI::App* command) const {
   }
   for (std::size_t i = 0; i < written.size(); ++i) {
     for (const fs::path& path : read) {
-      if (same_place(path, written[i])) refuse(written[i], "the output is an input", "two different files");
+      if (same_place(path, written[i])) refuse(written[i], "the output is the input", "two different files");
     }
     for (std::size_t j = 0; j < i; ++j) {
       if (same_place(written[j], written[i])) refuse(written[i], "two outputs of one name", "two names");
@@ -120,6 +124,8 @@ void FileOptions::check(const CLI::App* command) const {
   for (const fs::path& path : written) {
     const fs::path folder = path.parent_path();
     remove_leftovers(folder.empty() ? fs::path(".") : folder);
+    std::error_code ignored;
+    if (fs::is_directory(path, ignored)) remove_leftovers(path);
   }
 }
 

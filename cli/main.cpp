@@ -9,10 +9,12 @@
 #include <filesystem>
 #include <new>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "base/error.h"
 #include "base/progress.h"
@@ -29,9 +31,24 @@ constexpr const char* description =
     "any\n"
     "level of detail, convert and compare clips.";
 
-int report(ErrorKind kind, const std::string& message) {
+constexpr std::string_view no_memory = "out of memory; close other programs or work on fewer clips at once";
+
+int report(ErrorKind kind, std::string_view message) {
   kinespace::cli::tell(message);
   return static_cast<int>(kind);
+}
+
+// Memory that runs out inside a function that promised not to throw (there are some in the libraries below) ends the
+// process here instead of in a core dump. Nothing is half-written: outputs are put in place whole.
+[[noreturn]] void end_at_once() {
+  try {
+    if (std::current_exception()) std::rethrow_exception(std::current_exception());
+  } catch (const std::bad_alloc&) {
+    ::_exit(report(ErrorKind::machine, no_memory));
+  } catch (const std::exception& error) {
+    kinespace::cli::tell(error.what());
+  }
+  std::abort();
 }
 
 // The command line up to the subcommand, for "try ... --help".
@@ -63,7 +80,7 @@ int run(CLI::App& app, const kinespace::cli::Session& session, int argc, char** 
     kinespace::cli::tell(session.when_stopped);
     return 128 + kinespace::cli::stop_signal();
   } catch (const std::bad_alloc&) {
-    return report(ErrorKind::machine, "out of memory; close other programs or work on fewer clips at once");
+    return report(ErrorKind::machine, no_memory);
   } catch (const std::filesystem::filesystem_error& error) {
     return report_system_error(error, error.path1().string());
   } catch (const std::system_error& error) {  // no more threads, say
@@ -82,6 +99,7 @@ int flush_results(int code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::set_terminate(end_at_once);
   try {
     kinespace::cli::open_standard_descriptors();
     kinespace::cli::Session session;
@@ -96,6 +114,8 @@ int main(int argc, char** argv) {
     const int code = run(app, session, argc, argv);
     session.finish_progress();
     return flush_results(code);
+  } catch (const std::bad_alloc&) {
+    return report(ErrorKind::machine, no_memory);
   } catch (const std::exception& error) {
     return report(ErrorKind::machine, fmt::format("unexpected error, please report it: {}", error.what()));
   }

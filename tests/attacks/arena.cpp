@@ -1,6 +1,7 @@
 #include "tests/attacks/arena.h"
 
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
@@ -92,7 +93,8 @@ void Arena::expect_whole(const Work& work, const Outcome& outcome, bool killed) 
         << result.err;
   }
   std::set<std::string> names;
-  for (const auto* files : {&before_, &after, &outcome.files}) {
+  const std::array<const std::map<std::string, std::string>*, 3> folders = {&before_, &after, &outcome.files};
+  for (const auto* files : folders) {
     for (const auto& [name, content] : *files) names.insert(name);
   }
   bool left = false;

@@ -33,36 +33,46 @@ long wanted = 0;
 std::atomic<long> allocations{0};
 std::atomic<long> changes{0};
 
-// Before main and after the loader: what came earlier was not counted.
-__attribute__((constructor)) void begin() {
-  if (const char* text = std::getenv("KINESPACE_FAILPOINT")) {
-    const char* number = std::strchr(text, ':');
-    wanted = number == nullptr ? 0 : std::strtol(number + 1, nullptr, 10);
-    wish = std::strncmp(text, "alloc", 5) == 0  ? Wish::alloc
-           : std::strncmp(text, "disk", 4) == 0 ? Wish::disk
-                                                : Wish::kill;
-  }
-  allocations = 0;
-  changes = 0;
+// Calls are counted while main() runs: before and after it there is nobody to tell.
+std::atomic<bool> in_main{false};
+int (*real_main)(int, char**, char**) = nullptr;
+
+void read_wish() {
+  const char* text = std::getenv("KINESPACE_FAILPOINT");
+  if (text == nullptr) return;
+  const char* number = std::strchr(text, ':');
+  wanted = number == nullptr ? 0 : std::strtol(number + 1, nullptr, 10);
+  const auto is = [&](const char* name) { return std::strncmp(text, name, std::strlen(name)) == 0; };
+  wish = is("alloc") ? Wish::alloc : is("disk") ? Wish::disk : is("kill") ? Wish::kill : Wish::none;
 }
 
-__attribute__((destructor)) void end() {
-  const long alloc = allocations, change = changes;
+void write_counts() {
   const char* path = std::getenv("KINESPACE_FAILPOINT_COUNT");
   if (path == nullptr) return;
   if (std::FILE* file = std::fopen(path, "w")) {
-    std::fprintf(file, "%ld %ld\n", alloc, change);
+    std::fprintf(file, "%ld %ld\n", allocations.load(), changes.load());
     std::fclose(file);
   }
 }
 
+int counted_main(int argc, char** argv, char** environment) {
+  read_wish();
+  in_main = true;
+  const int code = real_main(argc, argv, environment);
+  in_main = false;
+  write_counts();
+  return code;
+}
+
 bool alloc_fails() {
+  if (!in_main) return false;
   const bool fails = ++allocations == wanted && wish == Wish::alloc;
   if (fails) errno = ENOMEM;
   return fails;
 }
 
 bool change_fails() {
+  if (!in_main) return false;
   if (++changes != wanted || wish == Wish::none || wish == Wish::alloc) return false;
   if (wish == Wish::kill) ::kill(::getpid(), SIGKILL);
   errno = ENOSPC;
@@ -82,6 +92,15 @@ bool is_file(int fd) {
 }  // namespace
 
 extern "C" {
+
+int __libc_start_main(int (*main)(int, char**, char**), int argc, char** argv, void (*init)(), void (*end)(),
+                      void (*loader_end)(), void* stack) {
+  real_main = main;
+  static auto* const real =
+      next<int(int (*)(int, char**, char**), int, char**, void (*)(), void (*)(), void (*)(), void*)>(
+          "__libc_start_main");
+  return real(counted_main, argc, argv, init, end, loader_end, stack);
+}
 
 void* malloc(std::size_t size) {
   return alloc_fails() ? nullptr : __libc_malloc(size);

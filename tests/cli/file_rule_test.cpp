@@ -115,7 +115,7 @@ class FileRule : public testing::Test {
   bool reads(const std::string& command, const fs::path& file) const {
     return std::ranges::any_of(calls().at(command), [&](const std::string& word) {
       if (!word.starts_with('@')) return false;
-      const fs::path input = folder_ / word.substr(1);
+      const fs::path input = folder_.path() / word.substr(1);
       return file == input || file.parent_path() == input;
     });
   }
