@@ -3,6 +3,7 @@
 //   0 done   1 the input is bad   2 usage   3 the machine could not   128 + N stopped by signal N (Ctrl-C: 130)
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <exception>
@@ -38,16 +39,18 @@ int report(ErrorKind kind, std::string_view message) {
   return static_cast<int>(kind);
 }
 
+std::atomic<bool> memory_ran_out{false};
+
+void remember_lack_of_memory() {
+  memory_ran_out = true;
+  throw std::bad_alloc();
+}
+
 // Memory that runs out inside a function that promised not to throw (there are some in the libraries below) ends the
 // process here instead of in a core dump. Nothing is half-written: outputs are put in place whole.
 [[noreturn]] void end_at_once() {
-  try {
-    if (std::current_exception()) std::rethrow_exception(std::current_exception());
-  } catch (const std::bad_alloc&) {
-    ::_exit(report(ErrorKind::machine, no_memory));
-  } catch (const std::exception& error) {
-    kinespace::cli::tell(error.what());
-  }
+  if (memory_ran_out) ::_exit(report(ErrorKind::machine, no_memory));
+  kinespace::cli::tell("unexpected end, please report it");
   std::abort();
 }
 
@@ -99,6 +102,7 @@ int flush_results(int code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::set_new_handler(remember_lack_of_memory);
   std::set_terminate(end_at_once);
   try {
     kinespace::cli::open_standard_descriptors();
