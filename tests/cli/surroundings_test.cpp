@@ -138,5 +138,36 @@ TEST(Surroundings, a_signal_stops_work_that_polls_its_progress) {
   EXPECT_THROW(progress.check_stop(), Interrupted);
 }
 
+TEST(Surroundings, a_loop_of_links_and_a_lost_working_folder_are_errors_of_one_line) {
+  const TemporaryFolder folder;
+  write_text(folder / "in.bvh", walking_bvh(5, 1));
+  std::filesystem::create_symlink(folder / "b.bvh", folder / "a.bvh");
+  std::filesystem::create_symlink(folder / "a.bvh", folder / "b.bvh");
+  const std::string loop = (folder / "a.bvh").string(), in = (folder / "in.bvh").string();
+  const std::string inside = (folder / "a.bvh/x").string();
+  for (const std::vector<std::string>& words :
+       std::vector<std::vector<std::string>>{{"info", loop},
+                                             {"convert", loop, "o.bvh"},
+                                             {"convert", in, loop},
+                                             {"convert", in, inside + ".glb"},
+                                             {"clean", in, "-o", loop},
+                                             {"build", loop, "-o", "o.kspace"},
+                                             {"build", in, "-o", inside},
+                                             {"encode", in, "-o", inside},
+                                             {"encode", loop, "-o", "o.ksm"},
+                                             {"decode", loop, "-o", "o"},
+                                             {"query", loop, in},
+                                             {"mesh", "info", loop},
+                                             {"mesh", "encode", in, "-o", inside}}) {
+    for (const char* shell : {"exec \"$@\"", "mkdir lost; cd lost; rmdir ../lost; exec \"$@\""}) {
+      const CommandResult result =
+          run_command(words, {.environment = {}, .shell = "cd '" + folder.path().string() + "'; " + shell});
+      EXPECT_THAT(result.code, testing::AnyOf(1, 2, 3)) << testing::PrintToString(words) << result.err;
+      EXPECT_EQ(std::count(result.err.begin(), result.err.end(), '\n'), 1) << result.err;
+      EXPECT_THAT(result.err, testing::Not(HasSubstr("please report"))) << testing::PrintToString(words);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace kinespace::test
