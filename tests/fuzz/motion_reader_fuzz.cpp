@@ -10,6 +10,7 @@
 
 #include "base/bytes.h"
 #include "base/error.h"
+#include "base/file.h"
 #include "examples/sample_motions.h"
 #include "fpca/library_builder.h"
 #include "fpca/library_view.h"
