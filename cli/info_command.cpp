@@ -67,10 +67,10 @@ bool is_library(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(file) && Library::looks_like_library(FileContent(file).bytes());
 }
 
-// A fact that the builder left, as a number; null where there is none.
-Json metadata_number(const Library& library, const char* key) {
-  const auto text = library.metadata(key);
-  return text ? Json::parse(*text, nullptr, false) : Json();
+// A fact that the builder may have left; null where it did not.
+template <class Number>
+Json or_null(const std::optional<Number>& fact) {
+  return fact ? Json(*fact) : Json();
 }
 
 Json describe_space(LibraryView& view, const SpaceRow& row) {
@@ -104,9 +104,9 @@ Json describe_library(const InfoOptions& options) {
   }
   return {{"kind", "library"},
           {"clips", totals.clips},
-          {"sequences", metadata_number(library, "sequences")},
-          {"functions", metadata_number(library, "functions")},
-          {"variance", metadata_number(library, "variance")},
+          {"sequences", or_null(library.metadata_count("sequences"))},
+          {"functions", or_null(library.metadata_count("functions"))},
+          {"variance", or_null(library.metadata_number("variance"))},
           {"frames", totals.frames},
           {"seconds", totals.seconds},
           {"rate_hz", rate},

@@ -251,8 +251,7 @@ int drop_unchanged(std::vector<Import>& imports, const Library& library, const L
 }
 
 void summarise(Library& library, LibraryReport& report) {
-  std::int64_t sequences = report.sequences;
-  if (const auto before = library.metadata("sequences")) sequences += std::stoll(*before);
+  const std::int64_t sequences = report.sequences + library.metadata_count("sequences").value_or(0);
   library.set_metadata("sequences", std::to_string(sequences));
   report.sequences = static_cast<int>(sequences);
   report.variance = 1;
