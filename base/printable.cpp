@@ -1,7 +1,5 @@
 #include "base/printable.h"
 
-#include <cstdint>
-
 namespace kinespace {
 namespace {
 
@@ -13,9 +11,9 @@ struct Character {
 };
 
 // Well-formed as in table 3-7 of the Unicode standard: nothing overlong, no surrogates, nothing above U+10FFFF.
-Character character_at(std::string_view text, std::size_t at) {
+Character character_at_start(std::string_view text) {
   const auto byte = [&](std::size_t i) -> std::uint32_t {
-    return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0;
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0;
   };
   const auto follows = [&](std::size_t i) { return (byte(i) & 0xC0U) == 0x80U; };
   const std::uint32_t first = byte(0);
@@ -41,14 +39,24 @@ bool is_obeyed(std::uint32_t code) {
   return control || separator || direction;
 }
 
+}  // namespace
+
+CharacterOfText first_character(std::string_view text) {
+  const auto [code, bytes] = character_at_start(text);
+  if (bytes == 0) return {static_cast<unsigned char>(text.front()), 1, false, true};
+  return {code, bytes, true, is_obeyed(code)};
+}
+
+namespace {
+
 std::string cleaned(std::string_view text, char instead, bool keep_lines) {
   std::string out;
   out.reserve(text.size());
-  for (std::size_t at = 0; at < text.size();) {
-    const auto [code, bytes] = character_at(text, at);
-    const bool stays = bytes > 0 && (!is_obeyed(code) || (keep_lines && code == '\n'));
-    stays ? out.append(text.substr(at, bytes)) : out.append(1, instead);
-    at += bytes > 0 ? bytes : 1;
+  while (!text.empty()) {
+    const CharacterOfText next = first_character(text);
+    const bool stays = next.well_formed && (!next.obeyed || (keep_lines && next.code == '\n'));
+    stays ? out.append(text.substr(0, next.bytes)) : out.append(1, instead);
+    text.remove_prefix(next.bytes);
   }
   return out;
 }

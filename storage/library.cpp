@@ -31,7 +31,9 @@ void require_file(const std::filesystem::path& path) {
   if (std::filesystem::is_regular_file(status)) return;
   const bool exists = std::filesystem::exists(status);
   throw Error(ErrorKind::bad_input, {.file = path.string(),
-                                     .found = exists ? "not a regular file" : "no such file",
+                                     .found = std::filesystem::is_directory(status) ? "a folder"
+                                              : exists                              ? "not a regular file"
+                                                                                    : "no such file",
                                      .expected = "a library",
                                      .remedy = "check the path; `kinespace build` makes a library"});
 }

@@ -104,9 +104,9 @@ void check_size(sqlite::Database& database) {
   }
 }
 
-// Whatever else a file holds works on every row that is written: an index of a few bytes made a library of 150 KB one of
-// 600 MB. So there is nothing beside the tables and the indices that SQLite makes for their keys itself, which have no
-// text of their own.
+// Whatever else a file holds works on every row that is written: an index of a few bytes made a library of 150 KB one
+// of 600 MB. So there is nothing beside the tables and the indices that SQLite makes for their keys itself, which have
+// no text of their own.
 [[noreturn]] void refuse_foreign(const sqlite::Database& database, const std::string& type, const std::string& name) {
   throw Error(ErrorKind::bad_input,
               {.file = database.shown(),

@@ -10,7 +10,8 @@ namespace kinespace {
 namespace {
 
 TEST(Printable, letters_of_any_language_stay) {
-  for (const char* text : {"walk", "caf\xc3\xa9", "\xe6\xad\xa9\xe3\x81\x8f", "\xf0\x9f\x9a\xb6 1", "a \"b\" 'c' \\ /"}) {
+  for (const char* text :
+       {"walk", "caf\xc3\xa9", "\xe6\xad\xa9\xe3\x81\x8f", "\xf0\x9f\x9a\xb6 1", "a \"b\" 'c' \\ /"}) {
     EXPECT_EQ(printable(text), text);
     EXPECT_EQ(printable_lines(text), text);
   }
@@ -19,9 +20,18 @@ TEST(Printable, letters_of_any_language_stay) {
 TEST(Printable, what_a_terminal_would_obey_becomes_question_marks) {
   EXPECT_EQ(printable("a\x1b[31mb\rc\nd\x07"), "a?[31mb?c?d?");
   EXPECT_EQ(printable(std::string_view("a\0b\x7f", 4)), "a?b?");
-  EXPECT_EQ(printable("a\xc2\x9b" "31m"), "a?31m") << "CSI as a C1 control";
-  EXPECT_EQ(printable("a\xe2\x80\xae" "fvb.exe"), "a?fvb.exe") << "right to left from here";
-  EXPECT_EQ(printable("a\xe2\x80\xa8" "b"), "a?b") << "a line separator";
+  EXPECT_EQ(printable("a\xc2\x9b"
+                      "31m"),
+            "a?31m")
+      << "CSI as a C1 control";
+  EXPECT_EQ(printable("a\xe2\x80\xae"
+                      "fvb.exe"),
+            "a?fvb.exe")
+      << "right to left from here";
+  EXPECT_EQ(printable("a\xe2\x80\xa8"
+                      "b"),
+            "a?b")
+      << "a line separator";
 }
 
 TEST(Printable, lines_stay_where_they_are_meant) {
@@ -29,7 +39,9 @@ TEST(Printable, lines_stay_where_they_are_meant) {
 }
 
 TEST(Printable, what_is_not_utf8_becomes_question_marks) {
-  EXPECT_EQ(printable("\x9b" "31m"), "?31m");
+  EXPECT_EQ(printable("\x9b"
+                      "31m"),
+            "?31m");
   EXPECT_EQ(printable("\xc0\xaf"), "??") << "overlong";
   EXPECT_EQ(printable("\xe0\x80\x9b"), "???") << "overlong";
   EXPECT_EQ(printable("\xed\xa0\x80"), "???") << "a surrogate";

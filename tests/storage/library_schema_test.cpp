@@ -36,7 +36,7 @@ class LibrarySchema : public testing::Test {
   }
 
   [[nodiscard]] bool holds(std::string_view text) const {
-    return MappedFile(path_).text().find(text) != std::string_view::npos;
+    return FileContent(path_).text().find(text) != std::string_view::npos;
   }
 
   test::TemporaryFolder folder_;
@@ -59,15 +59,15 @@ TEST_P(ForeignThings, are_refused_however_the_library_is_opened) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, ForeignThings,
-    testing::Values("CREATE INDEX strange ON clips(name)", "CREATE UNIQUE INDEX strange ON clip_vectors(blob)",
-                    "CREATE INDEX strange ON clips(hex(zeroblob(frames))) WHERE frames > 0",
-                    "CREATE INDEX \"sqlite%autoindex strange\" ON clips(name)",
-                    "CREATE VIEW strange AS SELECT * FROM clips",
-                    "CREATE TRIGGER strange AFTER INSERT ON clips BEGIN DELETE FROM clips; END",
-                    "CREATE TABLE strange(a)", "CREATE TABLE strange(a PRIMARY KEY) WITHOUT ROWID",
-                    "CREATE VIRTUAL TABLE strange USING rtree(id, low, high)"));
+INSTANTIATE_TEST_SUITE_P(All, ForeignThings,
+                         testing::Values("CREATE INDEX strange ON clips(name)",
+                                         "CREATE UNIQUE INDEX strange ON clip_vectors(blob)",
+                                         "CREATE INDEX strange ON clips(hex(zeroblob(frames))) WHERE frames > 0",
+                                         "CREATE INDEX \"sqlite%autoindex strange\" ON clips(name)",
+                                         "CREATE VIEW strange AS SELECT * FROM clips",
+                                         "CREATE TRIGGER strange AFTER INSERT ON clips BEGIN DELETE FROM clips; END",
+                                         "CREATE TABLE strange(a)", "CREATE TABLE strange(a PRIMARY KEY) WITHOUT ROWID",
+                                         "CREATE VIRTUAL TABLE strange USING rtree(id, low, high)"));
 
 TEST_F(LibrarySchema, statistics_are_not_ours_either) {
   change("ANALYZE");
@@ -76,8 +76,7 @@ TEST_F(LibrarySchema, statistics_are_not_ours_either) {
 
 TEST_F(LibrarySchema, the_indices_of_keys_belong_to_the_tables) {
   EXPECT_NO_THROW(static_cast<void>(Library::open(path_)));
-  const Library fixture =
-      Library::open_read_only(std::filesystem::path(KINESPACE_FIXTURES) / "library_v1.kspace");
+  const Library fixture = Library::open_read_only(std::filesystem::path(KINESPACE_FIXTURES) / "library_v1.kspace");
   EXPECT_FALSE(fixture.clips().empty());
 }
 
@@ -113,7 +112,8 @@ TEST_F(LibrarySchema, extending_holds_a_row_in_memory_and_not_the_library) {
   {
     Library library = Library::open(path_);
     Transaction together(library);
-    for (std::size_t i = 0; i < rows; ++i) library.put_artifact("big", std::to_string(i), Bytes(row_bytes, std::byte{7}));
+    for (std::size_t i = 0; i < rows; ++i)
+      library.put_artifact("big", std::to_string(i), Bytes(row_bytes, std::byte{7}));
     together.commit();
   }
   const test::AllocationMeter meter;
