@@ -2,23 +2,16 @@
 
 #include <utility>
 
+#include "base/printable.h"
+
 namespace kinespace {
 namespace {
 
 // File contents end up in messages; a terminal must not obey them.
-std::string printable(const std::string& text) {
-  std::string out;
-  out.reserve(text.size());
-  for (const char c : text) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f) {
-      out += '?';
-    } else {
-      out += c;
-    }
-  }
+std::string shown_part(const std::string& text) {
   constexpr std::size_t longest = 300;
-  if (out.size() > longest) out = out.substr(0, longest) + "...";
-  return out;
+  if (text.size() <= longest) return printable(text);
+  return printable(cut_text(text, longest)) + "...";
 }
 
 }  // namespace
@@ -26,16 +19,16 @@ std::string printable(const std::string& text) {
 std::string format_error(const ErrorDetails& details) {
   std::string out;
   if (!details.file.empty()) {
-    out += printable(details.file);
+    out += shown_part(details.file);
     if (details.line > 0) out += ":" + std::to_string(details.line);
     out += ": ";
   }
-  if (!details.found.empty()) out += printable(details.found);
+  if (!details.found.empty()) out += shown_part(details.found);
   if (!details.expected.empty()) {
     out += details.found.empty() ? "expected " : ", expected ";
-    out += printable(details.expected);
+    out += shown_part(details.expected);
   }
-  if (!details.remedy.empty()) out += "; " + printable(details.remedy);
+  if (!details.remedy.empty()) out += "; " + shown_part(details.remedy);
   return out;
 }
 

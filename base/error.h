@@ -38,7 +38,7 @@ class Error : public std::runtime_error {
   ErrorDetails details_;
 };
 
-// "FILE:LINE: found X, expected Y; REMEDY" on one line, control characters escaped.
+// "FILE:LINE: found X, expected Y; REMEDY" on one line, fit for a terminal (base/printable.h).
 [[nodiscard]] std::string format_error(const ErrorDetails& details);
 
 }  // namespace kinespace

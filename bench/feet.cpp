@@ -118,8 +118,8 @@ double steps_of(const FootContacts& contacts) {
 Outcome outcome_of(const Skating& skating, bool twice) {
   const CleanResult result = clean(skating.clip);
   const CleanReport& r = result.report;
-  Outcome out{.before = foot_slide_cm_s(foot_tracks(skating.clip, r.feet), skating.stands),
-              .after = foot_slide_cm_s(foot_tracks(result.clip, r.feet), skating.stands),
+  Outcome out{.before = foot_slide_cm_s(foot_tracks(skating.clip, r.feet), skating.stands).value_or(0),
+              .after = foot_slide_cm_s(foot_tracks(result.clip, r.feet), skating.stands).value_or(0),
               .steps = steps_of(skating.stands),
               .penetration = r.floor_penetration_cm,
               .pose = r.mean_pose_change_cm,

@@ -1,6 +1,7 @@
 #include "bench/mesh_measures.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -43,11 +44,12 @@ double projected_kg(const MeshSequence& mesh, const std::vector<RigidMotion>& mo
 // A line of /proc/self/status, in kB; none where there is no such file.
 std::optional<double> status_kb(const std::string& field) {
   std::ifstream in("/proc/self/status");
-  for (std::string word; in >> word;) {
-    if (word != field + ":") continue;
+  for (std::string line; std::getline(in, line);) {
+    if (!line.starts_with(field + ":")) continue;
+    const std::size_t digits = std::min(line.find_first_of("0123456789"), line.size());
     double value = 0;
-    in >> value;
-    return value;
+    const auto read = std::from_chars(line.data() + digits, line.data() + line.size(), value);
+    return read.ec == std::errc() ? std::optional(value) : std::nullopt;
   }
   return std::nullopt;
 }

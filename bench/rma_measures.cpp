@@ -19,7 +19,7 @@ namespace {
 struct ClipJudgement {
   double slide = 0;
   double original = 0;
-  double planted = 0;  // frames of clips with feet
+  double planted = 0;  // frames of clips with feet that stand
   std::vector<float> at_seams;
   std::vector<float> elsewhere;
 };
@@ -28,10 +28,10 @@ ClipJudgement judge(const Clip& original, const Clip& decoded, const std::vector
   ClipJudgement out;
   const auto after = compare_skate(original, decoded);
   const auto before = compare_skate(original, original);
-  if (after && before) {
+  if (after && before && after->foot_slide_cm_s && before->foot_slide_cm_s) {
     out.planted = original.frames;
-    out.slide = after->foot_slide_cm_s * out.planted;
-    out.original = before->foot_slide_cm_s * out.planted;
+    out.slide = *after->foot_slide_cm_s * out.planted;
+    out.original = *before->foot_slide_cm_s * out.planted;
   }
   const JointPositions p = joint_positions(decoded);
   for (int f = 1; f + 1 < decoded.frames; ++f) {

@@ -9,6 +9,7 @@
 
 #include "base/file.h"
 #include "cli/commands.h"
+#include "cli/output.h"
 #include "cli/session.h"
 
 namespace kinespace::cli {
@@ -27,16 +28,16 @@ struct BenchCommandOptions {
 };
 
 void print_rows(const BenchReport& report) {
-  fmt::print("{}: {}; threads: {}\n", report.bench, report.device, report.threads);
+  print("{}: {}; threads: {}\n", report.bench, report.device, report.threads);
   for (const BenchResult& result : report.results) {
     std::string verdict;
     if (result.bar) {
       verdict = fmt::format("  {} ({} {:.4g})", result.ok() ? "ok" : "MISSED",
                             result.higher_is_better ? ">=" : "<=", *result.bar);
     }
-    fmt::print("  {}, {}: {:.4g} {}{}\n", result.name, result.data, result.value, result.unit, verdict);
+    print("  {}, {}: {:.4g} {}{}\n", result.name, result.data, result.value, result.unit, verdict);
   }
-  for (const BenchTable& table : report.tables) fmt::print("\n{}", to_text(table));
+  for (const BenchTable& table : report.tables) print("\n{}", to_text(table));
 }
 
 void write_pictures(const BenchReport& report, const std::filesystem::path& folder) {
@@ -48,7 +49,7 @@ void write_pictures(const BenchReport& report, const std::filesystem::path& fold
 
 void run_bench(const BenchCommandOptions& options) {
   if (options.list) {
-    for (const Bench& bench : all_benches()) fmt::print("{}\n", bench.name);
+    for (const Bench& bench : all_benches()) print("{}\n", bench.name);
     return;
   }
   if (options.name.empty()) throw CLI::RequiredError("NAME");
@@ -61,9 +62,9 @@ void run_bench(const BenchCommandOptions& options) {
     const BenchReport report = bench.run(bench_options);
     if (!options.pictures.empty()) write_pictures(report, options.pictures);
     if (options.json) {
-      fmt::print("{}", to_json(report));
+      print("{}", to_json(report));
     } else if (options.markdown) {
-      fmt::print("{}", to_markdown(report));
+      print("{}", to_markdown(report));
     } else {
       print_rows(report);
     }

@@ -20,7 +20,7 @@ struct BlendCommandOptions {
   SynthesisOutput output;
 };
 
-void run_blend(BlendCommandOptions options) {
+void run_blend(BlendCommandOptions options, Session& session) {
   static_cast<void>(files_written(options.output.file));  // an ending that cannot be written is told before the work
   if (!options.weights.empty()) options.blend.weights = options.weights;
   options.blend.functions = options.functions.value_or(-1);
@@ -33,7 +33,7 @@ void run_blend(BlendCommandOptions options) {
               {"cost", blend.cost_cm},
               {"seam_speed_ratio", blend.ratios.speed},
               {"seam_acceleration_ratio", blend.ratios.acceleration}};
-  write_synthesis(options.output, blend.clip, {}, result);
+  write_synthesis(options.output, blend.clip, {}, result, session);
   options.output.json ? print_json(result) : print_fields(result);
 }
 
@@ -60,7 +60,7 @@ void add_blend(CLI::App& app, Session& session) {
   session.files.reads(command, {"LIB"});
   session.files.writes(command, {"--output"});
   session.files.writes(command, {"--picture"}, FileKind::svg);
-  command->callback([options] { run_blend(*options); });
+  command->callback([options, &session] { run_blend(*options, session); });
 }
 
 }  // namespace kinespace::cli

@@ -76,6 +76,7 @@ void run_build(BuildOptions options, Session& session) {
   session.detail(fmt::format("{} motion files", files.size()));
   const LibraryReport report = build_or_tell_what_stays(files, options, compute, session);
   session.finish_progress();
+  for (const std::string& doubt : report.doubts) session.note(doubt);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   const Json result = to_json(report, options.output, elapsed.count());
   options.json ? print_json(result) : print_fields(result);

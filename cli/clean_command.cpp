@@ -41,8 +41,8 @@ Json to_json(const CleanCommandOptions& options, const CleanResult& result) {
   return {{"output", options.output.string()},
           {"frames", result.clip.frames},
           {"plants", r.plants.size()},
-          {"foot_slide_before_cm_s", r.foot_slide_before_cm_s},
-          {"foot_slide_after_cm_s", r.foot_slide_after_cm_s},
+          {"foot_slide_before_cm_s", or_null(r.foot_slide_before_cm_s)},
+          {"foot_slide_after_cm_s", or_null(r.foot_slide_after_cm_s)},
           {"floor_penetration_cm", r.floor_penetration_cm},
           {"mean_pose_change_cm", r.mean_pose_change_cm},
           {"acceleration_ratio", r.acceleration_ratio},
@@ -63,11 +63,13 @@ void run_clean(const CleanCommandOptions& options, Session& session) {
   }
   if (model) clean_options.model = &*model;
   const Clip clip = read_clip(options.input);
+  session.note_doubts(clip);
   Session::check_stop();
   const CleanResult result = clean(clip, clean_options);
   Session::check_stop();
   write_clip(options.output, result.clip);
   if (options.picture) write_picture(*options.picture, clip, result);
+  for (const std::string& doubt : doubts_about(result.report)) session.warn(doubt);
   const Json out = to_json(options, result);
   options.json ? print_json(out) : print_fields(out);
 }

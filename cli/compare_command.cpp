@@ -31,8 +31,12 @@ Json to_json(const MotionError& error) {
 // The figures of the feet, null where no feet can be told.
 void add_skate(Json& result, const Clip& reference, const Clip& other, Session& session) {
   const auto skate = compare_skate(reference, other);
-  if (!skate) session.note("no feet found: foot_slide_cm_s and floor_penetration_cm are not known");
-  result["foot_slide_cm_s"] = skate ? Json(skate->foot_slide_cm_s) : Json(nullptr);
+  if (!skate) {
+    session.note("no feet found: foot_slide_cm_s and floor_penetration_cm are not known");
+  } else if (!skate->foot_slide_cm_s) {
+    session.note("no foot of the reference stands: foot_slide_cm_s is not known");
+  }
+  result["foot_slide_cm_s"] = skate ? or_null(skate->foot_slide_cm_s) : Json(nullptr);
   result["floor_penetration_cm"] = skate ? Json(skate->floor_penetration_cm) : Json(nullptr);
 }
 

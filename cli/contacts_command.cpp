@@ -9,8 +9,10 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/output.h"
 #include "footskate/contact_labels.h"
 #include "fpca/library_view.h"
 #include "motion/read.h"
@@ -48,10 +50,12 @@ const ContactModel& or_standard(const std::optional<ContactModel>& model) {
 }
 
 Clip clip_named(const ContactsOptions& options) {
-  if (!options.library || (is_motion_file(options.clip) && std::filesystem::exists(options.clip))) {
+  if (!options.library) return read_clip(options.clip);
+  LibraryView library(*options.library);
+  const bool there = std::filesystem::exists(options.clip);
+  if (there && (is_motion_file(options.clip) || !library.library().find_clip(options.clip))) {
     return read_clip(options.clip);
   }
-  LibraryView library(*options.library);
   return library.clip(library.require_clip(options.clip));
 }
 
@@ -64,7 +68,7 @@ void run_detect(const ContactsOptions& options) {
   const Ground ground = estimate_ground(tracks);
   const FootContacts contacts = or_standard(model).detect(tracks, ground);
   if (!options.json) {
-    fmt::print("{}", format_contacts(contacts, clip.skeleton, feet));
+    print("{}", format_contacts(contacts, clip.skeleton, feet));
     return;
   }
   print_json({{"clip", clip.name},
@@ -107,7 +111,7 @@ void run_next(const ContactsOptions& options) {
   const std::size_t labelled = labelled_clips(library.library()).size();
   if (next.distance < 0) {
     options.json ? print_json({{"clip", nullptr}, {"labelled_clips", labelled}})
-                 : fmt::print("# every clip with feet has labels\n");
+                 : print("# every clip with feet has labels\n");
     return;
   }
   const Clip clip = library.clip(library.require_clip(next.clip));
@@ -123,8 +127,8 @@ void run_next(const ContactsOptions& options) {
                 {"contacts", to_json(contacts, clip, feet)}});
     return;
   }
-  fmt::print("# label next: {} (frame {}, {:.2f} s, is {:.3f} leg lengths from what is labelled)\n{}", next.clip,
-             next.frame, next.frame / clip.rate_hz, next.distance, format_contacts(contacts, clip.skeleton, feet));
+  print("# label next: {} (frame {}, {:.2f} s, is {:.3f} leg lengths from what is labelled)\n{}", printable(next.clip),
+        next.frame, next.frame / clip.rate_hz, next.distance, format_contacts(contacts, clip.skeleton, feet));
 }
 
 std::string text_of(const std::string& file) {

@@ -22,6 +22,7 @@ struct ConvertOptions {
 void convert(const ConvertOptions& options, Session& session) {
   static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
   const Clip clip = read_clip(options.input, options.asf);
+  session.note_doubts(clip);
   Session::check_stop();
   write_clip(options.output, clip);
   if (options.json) {

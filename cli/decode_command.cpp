@@ -5,12 +5,15 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/stream_file.h"
@@ -80,28 +83,44 @@ std::vector<Clip> decode_clips(const StreamReader& reader, const DecodeOptions& 
   return out;
 }
 
-// A clip's name as a file's: what would lead elsewhere or hide the file becomes an underscore.
-std::string file_name(const std::string& clip) {
-  std::string out = clip.empty() ? "clip" : clip;
-  for (char& c : out) {
-    if (c == '/' || c == '\\' || c == '\0') c = '_';
+// Names for the clips' files below a folder, each once. A clip "b/walk" goes into a folder b; the name of a file is not
+// also that of a folder.
+class FileNames {
+ public:
+  explicit FileNames(std::string ending) : ending_(std::move(ending)) {}
+
+  fs::path make(const std::string& clip) {
+    const std::string plain = file_path_below(clip.empty() ? "clip" : clip);
+    std::string name = plain;
+    for (int n = 2; !take(name + ending_); ++n) name = fmt::format("{} ({})", plain, n);
+    return name + ending_;
   }
-  if (out.front() == '.') out.front() = '_';
-  return out;
-}
+
+ private:
+  bool take(const std::string& file) {
+    if (folders_.contains(file) || files_.contains(file)) return false;
+    std::vector<std::string> above;
+    for (fs::path folder = fs::path(file).parent_path(); !folder.empty(); folder = folder.parent_path()) {
+      above.push_back(folder.string());
+      if (files_.contains(above.back())) return false;
+    }
+    files_.insert(file);
+    folders_.insert(above.begin(), above.end());
+    return true;
+  }
+
+  std::string ending_;
+  std::set<std::string> files_;
+  std::set<std::string> folders_;
+};
 
 // OUT is a file for a single clip with an ending that can be written, else a folder.
 std::vector<fs::path> output_files(const std::vector<Clip>& clips, const DecodeOptions& options) {
   if (!is_motion_file(options.output) && options.output.extension() != ".glb" &&
       options.output.extension() != ".gltf") {
     std::vector<fs::path> out;
-    std::set<std::string> taken;
-    for (const Clip& clip : clips) {
-      std::string name = file_name(clip.name);
-      for (int n = 2; !taken.insert(name).second; ++n) name = fmt::format("{} ({})", file_name(clip.name), n);
-      out.push_back(options.output / (name + options.format));
-    }
-    fs::create_directories(options.output);
+    FileNames names(options.format);
+    for (const Clip& clip : clips) out.push_back(options.output / names.make(clip.name));
     return out;
   }
   if (clips.size() != 1) {
@@ -122,6 +141,7 @@ void run_decode(const DecodeOptions& options) {
   double frames = 0;
   for (std::size_t c = 0; c < clips.size(); ++c) {
     Session::check_stop();
+    if (files[c] != options.output) fs::create_directories(files[c].parent_path());
     write_clip(files[c], clips[c]);
     frames += clips[c].frames;
   }

@@ -7,6 +7,7 @@
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/output.h"
 #include "kernels/device.h"
 
 namespace kinespace::cli {
@@ -39,15 +40,15 @@ Json to_json(const DeviceList& list, unsigned threads) {
 }
 
 void print_table(const DeviceList& list, unsigned threads) {
-  fmt::print("{:<10} plain C++ on the processor, {} threads; single and double precision\n", "cpu", threads);
+  print("{:<10} plain C++ on the processor, {} threads; single and double precision\n", "cpu", threads);
   constexpr double gibibyte = 1024.0 * 1024.0 * 1024.0;
   for (std::size_t i = 0; i < list.devices.size(); ++i) {
     const DeviceInfo& device = list.devices[i];
-    fmt::print("{:<10} {} ({}, {}), {} compute units, {:.1f} GiB; {} precision\n", choice(i), device.name, device.type,
-               device.platform, device.compute_units, static_cast<double>(device.memory_bytes) / gibibyte,
-               precision(device));
+    print("{:<10} {} ({}, {}), {} compute units, {:.1f} GiB; {} precision\n", choice(i), device.name, device.type,
+          device.platform, device.compute_units, static_cast<double>(device.memory_bytes) / gibibyte,
+          precision(device));
   }
-  if (list.devices.empty()) fmt::print("No OpenCL device: {}\n", list.reason);
+  if (list.devices.empty()) print("No OpenCL device: {}\n", list.reason);
 }
 
 void run_devices(bool json) {

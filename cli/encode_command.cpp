@@ -14,9 +14,11 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/output.h"
 #include "codecs/clip_error.h"
 #include "codecs/library_basis.h"
 #include "codecs/registry.h"
+#include "fpca/library_builder.h"
 #include "motion/read.h"
 
 namespace kinespace::cli {
@@ -60,12 +62,14 @@ std::vector<fs::path> input_files(const std::vector<fs::path>& inputs) {
 
 std::vector<Clip> read_clips(const std::vector<fs::path>& files, const Progress& progress) {
   std::vector<Clip> out;
+  const std::vector<std::string> by_folder = clip_names(files);
   std::map<std::string, int> names;
   for (std::size_t i = 0; i < files.size(); ++i) {
     progress.at("reading", static_cast<double>(i) / static_cast<double>(files.size()));
     Session::check_stop();
     out.push_back(read_clip(files[i]));
-    // Two clips of one name could not be told apart when decoding.
+    out.back().name = by_folder[i];
+    // Two clips of one name could not be told apart when decoding: the same file, named twice.
     const int seen = ++names[out.back().name];
     if (seen > 1) out.back().name += fmt::format(" ({})", seen);
   }
@@ -138,8 +142,8 @@ void run_encode(const EncodeOptions& options, Session& session) {
 void print_settings() {
   for (const Codec* codec : all_codecs()) {
     for (const CodecSetting& setting : codec->settings()) {
-      fmt::print("{:<13} {:<21} {} ({}; {} to {})\n", codec->name(), setting.name, setting.meaning, setting.initial,
-                 setting.least, setting.most);
+      print("{:<13} {:<21} {} ({}; {} to {})\n", codec->name(), setting.name, setting.meaning, setting.initial,
+            setting.least, setting.most);
     }
   }
 }

@@ -22,23 +22,41 @@ struct ExportOptions {
   bool json = false;
 };
 
-void run_export(const ExportOptions& options) {
+// A bound looser than this says nothing about a person's motion.
+constexpr double loosest_bound_cm = 10;
+
+void run_export(const ExportOptions& options, Session& session) {
   static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
   LibraryView library(options.library);
   const ClipRow row = library.require_clip(options.clip);
   const MotionSpace& space = library.space(row.space_id);
   int functions = space.functions();
   if (options.functions) functions = std::min(*options.functions, functions);
-  if (options.max_error_cm) functions = library.functions_for_error(row, *options.max_error_cm);
+  std::optional<LibraryView::LevelOfDetail> level;
+  if (options.max_error_cm) {
+    level = library.level_for_error(row, *options.max_error_cm);
+    functions = level->functions;
+    if (!level->from_the_file) {
+      session.note("the file that the clip came from is not there unchanged: its stored error is added on top");
+    }
+  }
   const EncodedClip encoded = library.encoded(row);
   const Skeleton& skeleton = library.skeleton(row.skeleton_id);
   write_clip(options.output, clip_from_curves(decode(space, encoded, functions), skeleton));
-  const Json result{{"clip", row.name},
-                    {"output", options.output.string()},
-                    {"frames", row.frames},
-                    {"functions", functions},
-                    {"of_functions", space.functions()},
-                    {"rms_error_bound_cm", truncation_bound_cm(space, skeleton, encoded, functions)}};
+  Json result{{"clip", row.name},
+              {"output", options.output.string()},
+              {"frames", row.frames},
+              {"functions", functions},
+              {"of_functions", space.functions()}};
+  if (level) result["max_joint_error_cm"] = level->max_error_cm;
+  const double bound_cm = truncation_bound_cm(space, skeleton, encoded, functions);
+  if (bound_cm <= loosest_bound_cm) {
+    result["rms_error_bound_cm"] = bound_cm;
+  } else if (options.json) {
+    result["rms_error_bound_cm"] = nullptr;
+    session.note(fmt::format("rms_error_bound_cm is null: above {} cm it says nothing; kinespace compare measures",
+                             loosest_bound_cm));
+  }
   options.json ? print_json(result) : print_fields(result);
 }
 
@@ -52,13 +70,15 @@ void add_export(CLI::App& app, Session& session) {
   command->add_option("-o,--output", options->output, "The file to write: .bvh, .amc, .glb or .gltf")->required();
   CLI::Option* lod =
       command->add_option("--lod", options->functions, "Use only the first N functions")->check(CLI::NonNegativeNumber);
-  command->add_option("--max-error", options->max_error_cm, "The fewest functions with every joint this near, in cm")
+  command
+      ->add_option("--max-error", options->max_error_cm,
+                   "The fewest functions with every joint this near to the clip as it was read, in cm")
       ->check(CLI::NonNegativeNumber)
       ->excludes(lod);
   command->add_flag("--json", options->json, "Print what was written as one JSON object");
   session.files.reads(command, {"LIB"});
   session.files.writes(command, {"--output"});
-  command->callback([options] { run_export(*options); });
+  command->callback([options, &session] { run_export(*options, session); });
 }
 
 }  // namespace kinespace::cli

@@ -10,6 +10,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/output.h"
 #include "motion/read.h"
 #include "motion/strip.h"
 #include "synthesis/filling.h"
@@ -105,13 +106,12 @@ void write_picture(const std::filesystem::path& path, const Clip& input, const F
 }
 
 void print_gaps(const FillResult& result, const FillModel& model) {
-  fmt::print("{:>9}  {:>9}  {:>7}  {:>12}  {:>12}\n", "from s", "to s", "frames", "mean std cm", "max std cm");
+  print("{:>9}  {:>9}  {:>7}  {:>12}  {:>12}\n", "from s", "to s", "frames", "mean std cm", "max std cm");
   for (const FilledGap& gap : result.gaps) {
-    fmt::print("{:>9.3f}  {:>9.3f}  {:>7}  {:>12.3f}  {:>12.3f}\n", gap.frames.first_frame / result.clip.rate_hz,
-               gap.frames.last_frame / result.clip.rate_hz, gap.frames.count(), gap.std_cm.mean(),
-               gap.std_cm.maxCoeff());
+    print("{:>9.3f}  {:>9.3f}  {:>7}  {:>12.3f}  {:>12.3f}\n", gap.frames.first_frame / result.clip.rate_hz,
+          gap.frames.last_frame / result.clip.rate_hz, gap.frames.count(), gap.std_cm.mean(), gap.std_cm.maxCoeff());
   }
-  fmt::print("from {} clips, {:.0f} s\n", model.clips(), model.duration_s());
+  print("from {} clips, {:.0f} s\n", model.clips(), model.duration_s());
 }
 
 void run_fill(const FillCommandOptions& options, Session& session) {

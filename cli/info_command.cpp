@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -8,12 +9,15 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/output.h"
 #include "cli/repeat_report.h"
 #include "cli/stream_file.h"
 #include "codecs/registry.h"
 #include "fpca/library_view.h"
+#include "motion/plausibility.h"
 #include "motion/read.h"
 
 namespace kinespace::cli {
@@ -24,6 +28,7 @@ namespace {
 struct InfoOptions {
   std::filesystem::path file;
   std::optional<std::filesystem::path> basis;  // a library, for a stream that was made with one
+  std::size_t limit = 100;                     // clips that are listed for people
   bool json = false;
   std::vector<std::filesystem::path> files;  // all that were named; several only to be compared with each other
   bool repeats = false;
@@ -31,25 +36,12 @@ struct InfoOptions {
 };
 struct Describer {
   bool (*claims)(const std::filesystem::path& file);
-  Json (*describe)(const InfoOptions& options);
+  Json (*describe)(const InfoOptions& options, Session& session);
 };
 
-// The unit in which a skeleton of this height would be a person's, for files that do not say what they use.
-std::string guess_unit(double height) {
-  struct Range {
-    double low, high;
-    const char* unit;
-  };
-  constexpr std::array ranges{Range{0.5, 2.5, "m"}, Range{20, 95, "inch"}, Range{95, 250, "cm"},
-                              Range{500, 2500, "mm"}};
-  for (const auto& [low, high, unit] : ranges) {
-    if (height >= low && height < high) return unit;
-  }
-  return "unknown";
-}
-
-Json describe_clip(const InfoOptions& options) {
+Json describe_clip(const InfoOptions& options, Session& session) {
   const Clip clip = read_clip(options.file);
+  session.note_doubts(clip);
   const double height = clip.skeleton.rest_height();
   return {{"kind", "clip"},
           {"name", clip.name},
@@ -67,15 +59,10 @@ bool is_library(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(file) && Library::looks_like_library(FileContent(file).bytes());
 }
 
-// A fact that the builder left, as a number; null where there is none.
-Json metadata_number(const Library& library, const char* key) {
-  const auto text = library.metadata(key);
-  return text ? Json::parse(*text, nullptr, false) : Json();
-}
-
 Json describe_space(LibraryView& view, const SpaceRow& row) {
   const MotionSpace& space = view.space(row.id);
-  return {{"joints", space.skeleton().joint_count()},
+  return {{"clips", 0},
+          {"joints", space.skeleton().joint_count()},
           {"rotating_joints", space.layout().joint_count()},
           {"curves", space.curves()},
           {"points", space.points()},
@@ -83,7 +70,7 @@ Json describe_space(LibraryView& view, const SpaceRow& row) {
           {"variance", space.variance_covered()}};
 }
 
-Json describe_library(const InfoOptions& options) {
+Json describe_library(const InfoOptions& options, Session& /*session*/) {
   LibraryView view(options.file);
   const Library& library = view.library();
   const LibraryTotals totals = library.totals();
@@ -92,21 +79,31 @@ Json describe_library(const InfoOptions& options) {
   double rate = 0;
   std::int64_t joints = 0;
   double height = 0;
-  for (const ClipRow& row : library.clips()) {
-    rate = std::max(rate, row.rate_hz);
-    clips.push_back({{"name", row.name}, {"frames", row.frames}, {"rate_hz", row.rate_hz}, {"labels", row.labels}});
-  }
+  std::map<std::int64_t, std::size_t> space_at;  // where it stands in the list, by id
   for (const SpaceRow& row : library.spaces()) {
     if (!row.name.starts_with("sequences ")) continue;
+    space_at[row.id] = spaces.size();
     spaces.push_back(describe_space(view, row));
     joints = std::max<std::int64_t>(joints, view.space(row.id).skeleton().joint_count());
     height = std::max(height, view.space(row.id).skeleton().rest_height());
   }
+  for (const ClipRow& row : library.clips()) {
+    rate = std::max(rate, row.rate_hz);
+    const auto space = space_at.find(row.space_id);
+    clips.push_back({{"name", row.name},
+                     {"frames", row.frames},
+                     {"rate_hz", row.rate_hz},
+                     {"labels", row.labels},
+                     {"space", space == space_at.end() ? Json() : Json(space->second)}});
+    if (space == space_at.end()) continue;
+    Json& clips_of_space = spaces[space->second]["clips"];
+    clips_of_space = clips_of_space.get<std::int64_t>() + 1;
+  }
   return {{"kind", "library"},
           {"clips", totals.clips},
-          {"sequences", metadata_number(library, "sequences")},
-          {"functions", metadata_number(library, "functions")},
-          {"variance", metadata_number(library, "variance")},
+          {"sequences", or_null(library.metadata_count("sequences"))},
+          {"functions", or_null(library.metadata_count("functions"))},
+          {"variance", or_null(library.metadata_number("variance"))},
           {"frames", totals.frames},
           {"seconds", totals.seconds},
           {"rate_hz", rate},
@@ -124,7 +121,7 @@ bool is_stream(const std::filesystem::path& file) {
   return std::filesystem::is_regular_file(file) && Bitstream::has_magic(FileContent(file).bytes());
 }
 
-Json describe_stream(const InfoOptions& options) {
+Json describe_stream(const InfoOptions& options, Session& /*session*/) {
   const StreamFile file(options.file, options.basis);
   const StreamReader* reader = &file.reader();
   const Bitstream& stream = reader->stream();
@@ -155,6 +152,40 @@ Json describe_stream(const InfoOptions& options) {
           {"clip_list", std::move(clips)}};
 }
 
+// "walk happy": what a clip of a library is labelled.
+std::string labels_of_row(const Json& clip) {
+  std::string out;
+  for (const Json& label : clip.value("labels", Json::array())) {
+    out += (out.empty() ? "" : " ") + printable(label.get<std::string>());
+  }
+  return out;
+}
+
+// The clips of a library or a stream for people, after its figures; and of a library its skeletons.
+void print_lists(const Json& description, std::size_t limit) {
+  if (description.contains("spaces")) {
+    print("\n{:>8}  {:>6}  {:>8}  {:>9}\n", "skeleton", "joints", "rotating", "of clips");
+    std::size_t number = 0;
+    for (const Json& space : description["spaces"]) {
+      print("{:>8}  {:>6}  {:>8}  {:>9}\n", ++number, space["joints"].get<int>(), space["rotating_joints"].get<int>(),
+            space["clips"].get<std::int64_t>());
+    }
+  }
+  if (!description.contains("clip_list")) return;
+  const Json& clips = description["clip_list"];
+  const std::size_t shown = limit == 0 ? clips.size() : std::min(limit, clips.size());
+  print("\n{:>8}  {:>8}  {:>8}  clip\n", "frames", "rate Hz", "skeleton");
+  for (std::size_t i = 0; i < shown; ++i) {
+    const Json& clip = clips[i];
+    const bool of_space = clip.contains("space") && clip["space"].is_number();
+    const std::string labels = labels_of_row(clip);
+    print("{:>8}  {:>8.6g}  {:>8}  {}{}\n", clip["frames"].get<std::int64_t>(), clip["rate_hz"].get<double>(),
+          of_space ? clip["space"].get<std::int64_t>() + 1 : 1, printable(clip["name"].get<std::string>()),
+          labels.empty() ? "" : "  (" + labels + ")");
+  }
+  if (shown < clips.size()) print("... and {} more; --limit 0 lists all\n", clips.size() - shown);
+}
+
 constexpr std::array describers{
     Describer{is_stream, describe_stream},
     Describer{is_library, describe_library},
@@ -174,9 +205,10 @@ void run_info(InfoOptions& options, Session& session) {
   options.file = options.files.front();
   for (const Describer& describer : describers) {
     if (!describer.claims(options.file)) continue;
-    const Json description = describer.describe(options);
-    options.json ? print_json(description) : print_fields(description);
-    return;
+    const Json description = describer.describe(options, session);
+    if (options.json) return print_json(description);
+    print_fields(description);
+    return print_lists(description, options.limit);
   }
 }
 
@@ -191,6 +223,8 @@ void add_info(CLI::App& app, Session& session) {
           "A clip (.bvh, .amc), a library (.kspace) or a stream (.ksm); with --repeats clips and folders of them")
       ->required();
   command->add_option("--basis", options->basis, "The library that a stream was encoded with, if it was with one");
+  command->add_option("--limit", options->limit, "List at most so many clips; 0: all (--json always lists all)")
+      ->capture_default_str();
   command->add_flag("--json", options->json, "Print it as one JSON object");
   CLI::Option* repeats = command->add_flag(
       "--repeats", options->repeats, "Which stretches of the clips repeat others (repeated motion analysis, lin2011)");

@@ -4,23 +4,41 @@
 
 #include <fmt/format.h>
 
+#include "base/printable.h"
 #include "cli/output.h"
 
 namespace kinespace::cli {
 namespace {
 
 std::string shown(const Json& value) {
-  if (value.is_string()) return value.get<std::string>();
+  if (value.is_string()) return printable(value.get_ref<const std::string&>());
   if (value.is_null()) return "-";
   if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
   if (value.is_array()) return std::to_string(value.size());
   return value.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
+// What a terminal obeys and JSON lets stand as it is (DEL, C1 controls, marks of direction) as JSON's escapes: the
+// names are the true ones. Such characters are in strings only.
+std::string escaped(std::string_view json) {
+  std::string out;
+  out.reserve(json.size());
+  while (!json.empty()) {
+    const CharacterOfText next = first_character(json);
+    if (next.obeyed && next.code != '\n') {
+      out += fmt::format("\\u{:04x}", next.code);
+    } else {
+      out += json.substr(0, next.bytes);
+    }
+    json.remove_prefix(next.bytes);
+  }
+  return out;
+}
+
 }  // namespace
 
 void print_json(const Json& object) {
-  print("{}\n", object.dump(2, ' ', false, Json::error_handler_t::replace));
+  print("{}\n", escaped(object.dump(2, ' ', false, Json::error_handler_t::replace)));
 }
 
 void print_fields(const Json& object) {

@@ -22,6 +22,7 @@
 #include "cli/commands.h"
 #include "cli/output.h"
 #include "cli/session.h"
+#include "cli/user_words.h"
 
 namespace {
 
@@ -76,9 +77,12 @@ int run(CLI::App& app, const kinespace::cli::Session& session, int argc, char** 
   } catch (const CLI::Success& asked) {  // --help, --version
     return app.exit(asked);
   } catch (const CLI::ParseError& error) {
+    if (const auto mistyped = kinespace::cli::mistyped_subcommand(app, argc, argv)) {
+      return report(ErrorKind::usage, *mistyped);
+    }
     return report(ErrorKind::usage, fmt::format("{}; try '{}'", error.what(), help_command(app)));
   } catch (const kinespace::Error& error) {
-    return report(error.kind(), error.what());
+    return report(error.kind(), kinespace::cli::in_users_words(app, error));
   } catch (const kinespace::Interrupted&) {
     kinespace::cli::tell(session.when_stopped);
     return 128 + kinespace::cli::stop_signal();
@@ -110,7 +114,7 @@ int main(int argc, char** argv) {
     kinespace::cli::catch_stop_signals();
     CLI::App app{description, "kinespace"};
     app.set_version_flag("--version", "kinespace " KINESPACE_VERSION);
-    app.add_flag("-q,--quiet", session.quiet, "No progress and no notes, only results and errors");
+    app.add_flag("-q,--quiet", session.quiet, "No progress and no notes, only results, warnings and errors");
     app.add_flag("-v,--verbose", session.verbose, "More notes on what is done");
     app.require_subcommand(1);
     app.fallthrough();  // global options may also stand after the subcommand

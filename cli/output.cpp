@@ -1,6 +1,7 @@
 #include "cli/output.h"
 
 #include <cerrno>
+#include <new>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -21,7 +22,11 @@ void write_text(std::FILE* stream, std::string_view text) noexcept {
 
 void tell(std::string_view text) noexcept {
   write_text(stderr, "kinespace: ");
-  write_text(stderr, text);
+  try {
+    write_text(stderr, printable(text));
+  } catch (const std::bad_alloc&) {
+    write_text(stderr, "out of memory");
+  }
   write_text(stderr, "\n");
 }
 

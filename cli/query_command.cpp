@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/output.h"
 #include "motion/read.h"
 #include "synthesis/retrieval.h"
 #include "synthesis/windows.h"
@@ -40,17 +42,19 @@ Json to_json(const std::string& query, const std::vector<Match>& matches) {
 
 void print_matches(const std::vector<Match>& matches) {
   if (matches.empty()) {
-    fmt::print("no match\n");
+    print("no match\n");
     return;
   }
-  fmt::print("{:>10}  {:>8}  {:>8}  clip\n", "distance", "from s", "to s");
+  print("{:>10}  {:>8}  {:>8}  clip\n", "distance", "from s", "to s");
   for (const Match& match : matches)
-    fmt::print("{:>10.5f}  {:>8.2f}  {:>8.2f}  {}\n", match.distance, match.start_s, match.end_s, match.clip);
+    print("{:>10.5f}  {:>8.2f}  {:>8.2f}  {}\n", match.distance, match.start_s, match.end_s, printable(match.clip));
 }
 
-// A file where there is one of that name and a clip reader for it, else a clip of the library.
-bool is_file(const std::string& text) {
-  return is_motion_file(text) && std::filesystem::exists(text);
+// A file that a clip can be read from; else a clip of the library; else whatever of that name is there, for the reader
+// to say what is wrong with it.
+bool is_file(const std::string& text, const Library& library) {
+  if (!std::filesystem::exists(text)) return false;
+  return is_motion_file(text) || !library.find_clip(text);
 }
 
 std::vector<Match> nearest(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
@@ -61,9 +65,11 @@ std::vector<Match> nearest(LibraryView& library, const ClipCurves& curves, const
                          {.weighted = options.query.weighted}, except);
 }
 
-std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute) {
-  if (is_file(options.clip)) {
+std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute,
+                        Session& session) {
+  if (is_file(options.clip, library.library())) {
     const Clip clip = read_clip(options.clip);
+    session.note_doubts(clip);
     if (!library.space_for(clip.skeleton)) {
       throw Error(ErrorKind::bad_input,
                   {.file = options.clip,
@@ -77,11 +83,11 @@ std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options
   return nearest(library, library.curves(row), library.skeleton(row.skeleton_id), options, row.name, compute);
 }
 
-void run_query(QueryCommandOptions options) {
+void run_query(QueryCommandOptions options, Session& session) {
   options.query.rerank = !options.no_rerank;
   options.query.validate();
   LibraryView library(options.library);
-  const std::vector<Match> matches = find(library, options, Compute::open(options.device));
+  const std::vector<Match> matches = find(library, options, Compute::open(options.device), session);
   options.json ? print_json(to_json(options.clip, matches)) : print_matches(matches);
 }
 
@@ -109,7 +115,7 @@ void add_query(CLI::App& app, Session& session) {
   command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
   command->add_flag("--json", options->json, "Print the matches as one JSON object");
   session.files.reads(command, {"LIB", "CLIP"});
-  command->callback([options] { run_query(*options); });
+  command->callback([options, &session] { run_query(*options, session); });
 }
 
 }  // namespace kinespace::cli

@@ -8,7 +8,9 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/printable.h"
 #include "cli/json_output.h"
+#include "cli/output.h"
 #include "codecs/rma/markers.h"
 #include "codecs/rma/repeat_picture.h"
 #include "codecs/rma/repeats.h"
@@ -76,14 +78,14 @@ Json primaries(const RepeatAnalysis& analysis, const Places& places) {
 }
 
 std::string line_of(const Json& place) {
-  return fmt::format("{}  {:.2f} s to {:.2f} s", place["clip"].get<std::string>(), place["start_s"].get<double>(),
-                     place["end_s"].get<double>());
+  return fmt::format("{}  {:.2f} s to {:.2f} s", printable(place["clip"].get<std::string>()),
+                     place["start_s"].get<double>(), place["end_s"].get<double>());
 }
 
 void print_primaries(const Json& report) {
   for (const Json& primary : report["primaries"]) {
-    fmt::print("\n{}\n", line_of(primary));
-    for (const Json& repetition : primary["repetitions"]) fmt::print("  again  {}\n", line_of(repetition));
+    print("\n{}\n", line_of(primary));
+    for (const Json& repetition : primary["repetitions"]) print("  again  {}\n", line_of(repetition));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include "cli/output.h"
+#include "motion/plausibility.h"
 
 namespace kinespace::cli {
 namespace {
@@ -59,13 +60,21 @@ Progress Session::progress() {
   return progress;
 }
 
-void Session::note(std::string_view text) {
+void Session::warn(std::string_view text) {
   finish_progress();
-  if (!quiet) tell(text);
+  tell(text);
+}
+
+void Session::note(std::string_view text) {
+  if (!quiet) warn(text);
 }
 
 void Session::detail(std::string_view text) {
   if (verbose) note(text);
+}
+
+void Session::note_doubts(const Clip& clip) {
+  for (const Doubt& doubt : doubts_about(clip)) note(clip.name + ": " + doubt.text);
 }
 
 void Session::check_stop() {

@@ -8,6 +8,7 @@
 #include "base/progress.h"
 #include "cli/file_options.h"
 #include "cli/progress_bar.h"
+#include "motion/clip.h"
 
 namespace kinespace::cli {
 
@@ -21,7 +22,7 @@ void stop_at_once();
 
 class Session {
  public:
-  bool quiet = false;    // no progress and no notes, only results and errors
+  bool quiet = false;    // no progress and no notes, only results, warnings and errors
   bool verbose = false;  // more notes
 
   FileOptions files;  // which options name files
@@ -34,9 +35,14 @@ class Session {
   // Ends the bar, before results are printed.
   void finish_progress() { bar_.reset(); }
 
-  // A line "kinespace: TEXT" on standard error; `note` unless quiet, `detail` only when verbose.
+  // A line "kinespace: TEXT" on standard error: `warn` always, for a result that is not what it seems; `note` unless
+  // quiet; `detail` only when verbose.
+  void warn(std::string_view text);
   void note(std::string_view text);
   void detail(std::string_view text);
+
+  // Notes what in a clip that was read looks wrong (motion/plausibility.h): its unit, which way is up, its floor.
+  void note_doubts(const Clip& clip);
 
   // Throws Interrupted when a stop was asked for. For between two calls that have no Progress of their own.
   static void check_stop();

@@ -7,7 +7,8 @@
 
 namespace kinespace::cli {
 
-void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result) {
+void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result,
+                     Session& session) {
   StripOptions strip{.title = clip.name, .bands = bands};
   Json feet;
   if (output.clean_feet) {
@@ -22,9 +23,10 @@ void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector
     }
     strip.floor_cm = report.ground.height_cm;
     feet = {{"plants", report.plants.size()},
-            {"foot_slide_before_cm_s", report.foot_slide_before_cm_s},
-            {"foot_slide_after_cm_s", report.foot_slide_after_cm_s},
+            {"foot_slide_before_cm_s", or_null(report.foot_slide_before_cm_s)},
+            {"foot_slide_after_cm_s", or_null(report.foot_slide_after_cm_s)},
             {"floor_penetration_cm", report.floor_penetration_cm}};
+    for (const std::string& doubt : doubts_about(report)) session.warn(doubt);
     clip = cleaned.clip;
   }
   Session::check_stop();

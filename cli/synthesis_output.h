@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "cli/json_output.h"
+#include "cli/session.h"
 #include "motion/clip.h"
 #include "motion/strip.h"
 
@@ -20,6 +21,7 @@ struct SynthesisOutput {
 
 // Cleans the feet when asked, writes the motion and the picture, and adds to `result`: output, frames, duration_s,
 // rate_hz, and what the cleanup did. `bands`: what to mark in the picture.
-void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result);
+void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result,
+                     Session& session);
 
 }  // namespace kinespace::cli

@@ -82,7 +82,7 @@ void run_transition(const TransitionCommandOptions& options, Session& session) {
   Json result;
   if (plan) {
     result = to_json(*plan);
-    write_synthesis(options.output, plan->transition.clip, bands_of(*plan), result);
+    write_synthesis(options.output, plan->transition.clip, bands_of(*plan), result, session);
   } else {
     result = {{"clips", Json::array()}, {"found", false}};
     session.note("no way leads from one clip to the next; nothing was written (--max-cost allows farther steps)");

@@ -97,7 +97,7 @@ std::size_t StreamReader::find(std::string_view name) const {
   }
   throw Error(ErrorKind::usage, {.file = stream().source(),
                                  .found = fmt::format("no clip named {}", name),
-                                 .expected = "one of those that `kinespace info` lists"});
+                                 .expected = "one of those that `kinespace info --limit 0` lists"});
 }
 
 double Codec::setting(const CodecOptions& options, std::string_view name) const {

@@ -126,6 +126,23 @@ void CleanOptions::validate() const {
   require("passes", passes, 1, 20);
 }
 
+std::vector<std::string> doubts_about(const CleanReport& report) {
+  constexpr double measurable_cm_s = 0.01;
+  constexpr double usual_ratio = 1.5;
+  std::vector<std::string> out;
+  if (!report.foot_slide_before_cm_s || !report.foot_slide_after_cm_s) {
+    out.emplace_back("no foot was found to stand: nothing was planted, and how much feet slide is not known");
+  } else if (*report.foot_slide_after_cm_s > *report.foot_slide_before_cm_s + measurable_cm_s) {
+    out.push_back(fmt::format("planted feet slide more than before: {:.2f} cm/s, before {:.2f} cm/s",
+                              *report.foot_slide_after_cm_s, *report.foot_slide_before_cm_s));
+  }
+  if (report.acceleration_ratio > usual_ratio) {
+    out.push_back(fmt::format("the largest acceleration of a joint is {:.1f} times what it was: look at the result",
+                              report.acceleration_ratio));
+  }
+  return out;
+}
+
 CleanResult clean(const Clip& clip, const CleanOptions& options) {
   options.validate();
   CleanResult out{.clip = clip, .report = {}};

@@ -15,6 +15,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "footskate/plants.h"
@@ -35,9 +36,9 @@ struct CleanOptions {
 struct CleanReport {
   Feet feet;
   Ground ground;
-  std::vector<Plant> plants;          // those of the last pass that changed something
-  double foot_slide_before_cm_s = 0;  // over the contacts found in the input
-  double foot_slide_after_cm_s = 0;   // over the same frames
+  std::vector<Plant> plants;                     // those of the last pass that changed something
+  std::optional<double> foot_slide_before_cm_s;  // over the contacts found in the input; nullopt: there are none
+  std::optional<double> foot_slide_after_cm_s;   // over the same frames
   double floor_penetration_cm =
       0;  // after: the deepest joint; uneven ground: below the lower of its plants before and after
   double mean_pose_change_cm = 0;  // footskate/skate_measures.h
@@ -50,6 +51,11 @@ struct CleanResult {
   Clip clip;
   CleanReport report;
 };
+
+// What a user should know before believing the result, a sentence each: that no foot was found to stand, so that
+// nothing was cleaned and nothing is known of what slides; that feet slide more than before; that a joint is jerked
+// more than half as much again. Empty when all is well.
+[[nodiscard]] std::vector<std::string> doubts_about(const CleanReport& report);
 
 // Throws Error{bad_input} when no feet are found or a given contact is outside the clip.
 [[nodiscard]] CleanResult clean(const Clip& clip, const CleanOptions& options = {});

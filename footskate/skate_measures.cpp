@@ -9,7 +9,7 @@
 
 namespace kinespace {
 
-double foot_slide_cm_s(const FootTracks& tracks, const FootContacts& contacts) {
+std::optional<double> foot_slide_cm_s(const FootTracks& tracks, const FootContacts& contacts) {
   double sum = 0;
   std::int64_t steps = 0;
   for (const FootContact& c : contacts) {
@@ -20,7 +20,8 @@ double foot_slide_cm_s(const FootTracks& tracks, const FootContacts& contacts) {
       sum += std::hypot(step.x(), step.z()) * tracks.rate_hz;
     }
   }
-  return steps > 0 ? sum / static_cast<double>(steps) : 0;
+  if (steps == 0) return std::nullopt;
+  return sum / static_cast<double>(steps);
 }
 
 double floor_penetration_cm(const FootTracks& tracks, const Ground& ground) {

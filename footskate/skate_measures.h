@@ -1,13 +1,16 @@
 // How much feet skate, sink and were moved: the figures of `compare`, `clean` and the bench.
 #pragma once
 
+#include <optional>
+
 #include "footskate/contacts.h"
 
 namespace kinespace {
 
 // The mean horizontal speed, cm/s, of the joints of feet while they are planted: over all steps from a frame to the
-// next within a contact. 0 without contacts. The contacts may have been found on another clip of the same frames.
-[[nodiscard]] double foot_slide_cm_s(const FootTracks& tracks, const FootContacts& contacts);
+// next within a contact. nullopt where nothing stands for as long as a step: then nothing is known of what slides. The
+// contacts may have been found on another clip of the same frames.
+[[nodiscard]] std::optional<double> foot_slide_cm_s(const FootTracks& tracks, const FootContacts& contacts);
 
 // How far the deepest joint of a foot is under the ground, cm, >= 0; of uneven ground under its lowest level.
 [[nodiscard]] double floor_penetration_cm(const FootTracks& tracks, const Ground& ground);
@@ -24,7 +27,7 @@ namespace kinespace {
 
 // What `compare A B` says of feet: the ground and the contacts are those of A, the joints those of B, found by name.
 struct SkateFigures {
-  double foot_slide_cm_s = 0;
+  std::optional<double> foot_slide_cm_s;  // nullopt: A has no planted foot
   double floor_penetration_cm = 0;
 };
 

@@ -14,6 +14,7 @@
 #include "fpca/library_view.h"
 #include "fpca/space_codec.h"
 #include "motion/kinematics.h"
+#include "motion/plausibility.h"
 #include "motion/read.h"
 #include "storage/library_build.h"
 
@@ -36,22 +37,21 @@ struct Import {
   std::string name;
   std::string source_hash;  // of the file and, for AMC, its skeleton file
   std::string tree_hash;
+  std::vector<Doubt> doubts;
 };
-
-std::string hash_of(const std::filesystem::path& file, const std::optional<std::filesystem::path>& asf) {
-  std::string hash;
-  for (const auto& part : files_read(file, asf)) hash += content_hash(FileContent(part).bytes());
-  return hash;
-}
 
 // Reads a file unless an earlier build did, and keeps what came of it. True when it was there already.
 bool import_file(Import& import, const LibraryBuilderOptions& options, LibraryBuild& build) {
-  import.source_hash = hash_of(import.file, options.asf);
+  import.source_hash = source_hash_of(import.file, options.asf);
   if (const auto known = build.find_import(import.source_hash)) {
-    import.tree_hash = unpack_prepared(*known, import.file.string()).skeleton.tree_hash();
+    const PreparedClip clip = unpack_prepared(*known, import.file.string());
+    import.tree_hash = clip.skeleton.tree_hash();
+    import.doubts = doubts_about(clip_from_curves(clip.curves, clip.skeleton));
     return true;
   }
-  const PreparedClip clip = prepare(read_clip(import.file, options.asf), options.space.sequences);
+  const Clip read = read_clip(import.file, options.asf);
+  import.doubts = doubts_about(read);
+  const PreparedClip clip = prepare(read, options.space.sequences);
   import.tree_hash = clip.skeleton.tree_hash();
   build.keep_import(import.source_hash, pack_prepared(clip));
   return false;
@@ -78,6 +78,23 @@ int import_files(std::vector<Import>& imports, const LibraryBuilderOptions& opti
   return static_cast<int>(std::ranges::count(known, 1));
 }
 
+// A line a kind: the first clip that it is about, and how many others.
+std::vector<std::string> doubts_of(const std::vector<Import>& imports) {
+  std::vector<std::string> out;
+  for (const DoubtKind kind : {DoubtKind::height, DoubtKind::axis, DoubtKind::floor}) {
+    std::string line;
+    int others = -1;
+    for (const Import& import : imports) {
+      const auto found = std::ranges::find(import.doubts, kind, &Doubt::kind);
+      if (found == import.doubts.end()) continue;
+      if (++others == 0) line = import.file.string() + ": " + found->text;
+    }
+    if (others > 0) line += fmt::format(" (and so with {} other{})", others, others == 1 ? "" : "s");
+    if (!line.empty()) out.push_back(std::move(line));
+  }
+  return out;
+}
+
 PreparedSource source_of_imports(const std::vector<const Import*>& imports, const LibraryBuild& build) {
   return {static_cast<int>(imports.size()), [&imports, &build](int i) {
             const Import& import = *imports[static_cast<std::size_t>(i)];
@@ -94,9 +111,13 @@ PreparedSource source_of_imports(const std::vector<const Import*>& imports, cons
           }};
 }
 
-MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, const EncodedClip& encoded) {
-  const JointPositions a = joint_positions(clip_from_curves(clip.curves, clip.skeleton));
-  const JointPositions b = joint_positions(clip_from_curves(decode(space, encoded), clip.skeleton));
+// What the library gives back: scores and tracks in the steps that they are stored in.
+EncodedClip as_stored(const EncodedClip& clip, const MotionSpace& space, const Skeleton& skeleton) {
+  return unpack_clip(pack_clip(clip, space), space, skeleton,
+                     {.name = clip.name, .rate_hz = clip.rate_hz, .frames = clip.frames}, clip.name);
+}
+
+MeasuredError distance(const JointPositions& a, const JointPositions& b) {
   double sum = 0;
   double worst = 0;
   for (std::size_t i = 0; i < a.values.size(); ++i) {
@@ -105,6 +126,11 @@ MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, 
     worst = std::max(worst, e);
   }
   return {.mean_joint_error_cm = sum / static_cast<double>(a.values.size()), .max_joint_error_cm = worst};
+}
+
+MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, const EncodedClip& encoded) {
+  return distance(joint_positions(clip_from_curves(clip.curves, clip.skeleton)),
+                  joint_positions(clip_from_curves(decode(space, encoded), clip.skeleton)));
 }
 
 // What a space does with the clips of one joint tree.
@@ -146,7 +172,7 @@ class SpaceWriter {
     built_.space.apply_references(prepared.curves.values);
     out.clip =
         encode(built_.space, prepared.curves, prepared.runs, built_.warps[static_cast<std::size_t>(index)], compute_);
-    out.clip.error = measure_error(prepared, built_.space, out.clip);
+    out.clip.error = measure_error(prepared, built_.space, as_stored(out.clip, built_.space, prepared.skeleton));
     out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
     return out;
@@ -191,9 +217,15 @@ void transfer_clips(Library& library, std::int64_t space_id, const MotionSpace& 
     EncodedClip clip =
         unpack_clip(packed, from, skeleton,
                     {.name = row.name, .rate_hz = row.rate_hz, .frames = static_cast<int>(row.frames)}, row.name);
+    const JointPositions before = joint_positions(clip_from_curves(decode(from, clip), skeleton));
     for (EncodedRun& run : clip.runs) {
       for (EncodedSequence& s : run.sequences) s.scores = to.transfer(s.scores, from);
     }
+    // Its own curves are not there any more; with what the transfer moves added, its error is never less than it is.
+    const MeasuredError moved =
+        distance(before, joint_positions(clip_from_curves(decode(to, as_stored(clip, to, skeleton)), skeleton)));
+    clip.error.mean_joint_error_cm += moved.mean_joint_error_cm;
+    clip.error.max_joint_error_cm += moved.max_joint_error_cm;
     const std::vector<float> old_vector = library.retrieval_vector(row.id);
     const Eigen::Map<const ScoreMatrix> old_scores(old_vector.data(), clips_from.space().functions(),
                                                    clips_from.space().curves());
@@ -245,14 +277,13 @@ int drop_unchanged(std::vector<Import>& imports, const Library& library, const L
   const std::size_t before = imports.size();
   std::erase_if(imports, [&](const Import& import) {
     const auto row = library.find_clip(import.name);
-    return row && row->source_hash == hash_of(import.file, options.asf);
+    return row && row->source_hash == source_hash_of(import.file, options.asf);
   });
   return static_cast<int>(before - imports.size());
 }
 
 void summarise(Library& library, LibraryReport& report) {
-  std::int64_t sequences = report.sequences;
-  if (const auto before = library.metadata("sequences")) sequences += std::stoll(*before);
+  const std::int64_t sequences = report.sequences + library.metadata_count("sequences").value_or(0);
   library.set_metadata("sequences", std::to_string(sequences));
   report.sequences = static_cast<int>(sequences);
   report.variance = 1;
@@ -347,6 +378,7 @@ LibraryReport build_library(const std::vector<std::filesystem::path>& files, con
   LibraryBuild build(target, {.fingerprint = fingerprint_of(options), .extend = options.add});
   if (options.add) report.unchanged = drop_unchanged(imports, Library::open_read_only(target), options);
   report.resumed = import_files(imports, options, build, progress);
+  report.doubts = doubts_of(imports);
 
   std::map<std::string, std::vector<const Import*>> by_tree;
   for (const Import& import : imports) by_tree[import.tree_hash].push_back(&import);

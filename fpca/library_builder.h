@@ -37,6 +37,7 @@ struct LibraryReport {
   double max_joint_error_cm = 0;
   std::int64_t frames = 0;
   std::int64_t bytes = 0;
+  std::vector<std::string> doubts;  // what looks wrong in clips (motion/plausibility.h), a line a kind
 };
 
 // Every motion file among the arguments: files as they are, folders with all below them; sorted, each once. Throws

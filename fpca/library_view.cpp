@@ -1,37 +1,51 @@
 #include "fpca/library_view.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/error.h"
+#include "base/file.h"
+#include "base/nearest_name.h"
 #include "fpca/space_codec.h"
 #include "motion/kinematics.h"
+#include "motion/read.h"
+#include "motion/text.h"
 
 namespace kinespace {
 namespace {
 
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j < row.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i;
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({row[j - 1] + 1, above + 1, diagonal + (a[i - 1] == b[j - 1] ? 0U : 1U)});
-      diagonal = above;
-    }
-  }
-  return row.back();
+constexpr const char* known_endings[] = {".bvh", ".amc", ".asf", ".glb", ".gltf", ".fbx", ".c3d", ".ksm", ".kspace"};
+
+bool looks_like_a_file(const std::string& name) {
+  const std::string ending = std::filesystem::path(name).extension().string();
+  return name.find('/') != std::string::npos ||
+         std::ranges::any_of(known_endings, [&](const char* known) { return same_word(ending, known); });
 }
 
 double largest_distance(const JointPositions& a, const JointPositions& b) {
+  if (a.values.size() != b.values.size()) return std::numeric_limits<double>::infinity();
   double largest = 0;
   for (std::size_t i = 0; i < a.values.size(); ++i) largest = std::max(largest, (a.values[i] - b.values[i]).norm());
   return largest;
+}
+
+// `known`: how near all functions come.
+[[noreturn]] void refuse_level(const Library& library, const ClipRow& row, const std::string& known, double asked_cm) {
+  const bool nothing = known == "nothing";
+  throw Error(ErrorKind::usage,
+              {.file = library.path().string(),
+               .found = fmt::format("a largest error of {:.3g} cm asked of the clip \"{}\"", asked_cm, row.name),
+               .expected = nothing ? "an error that can be promised: the library does not know how near its functions "
+                                     "come to the clip as it was read, and the file it came from is not there unchanged"
+                                   : fmt::format("at least {}: so near do all its functions come to the clip as it "
+                                                 "was read",
+                                                 known),
+               .remedy = "ask for less with --lod, or build the library with more functions"});
 }
 
 }  // namespace
@@ -43,25 +57,34 @@ std::string clip_space_name(const std::string& tree_hash) {
   return "clips " + tree_hash;
 }
 
+std::string source_hash_of(const std::filesystem::path& file, const std::optional<std::filesystem::path>& asf) {
+  std::string hash;
+  for (const auto& part : files_read(file, asf)) hash += content_hash(FileContent(part).bytes());
+  return hash;
+}
+
 LibraryView::LibraryView(const std::filesystem::path& path) : library_(Library::open_read_only(path)) {}
 
 ClipRow LibraryView::require_clip(const std::string& name) const {
   if (auto row = library_.find_clip(name)) return *std::move(row);
-  std::string nearest;
-  std::size_t least = std::numeric_limits<std::size_t>::max();
-  for (const ClipRow& row : library_.clips()) {
-    const std::size_t d = edit_distance(name, row.name);
-    if (d < least) {
-      least = d;
-      nearest = row.name;
-    }
+  std::error_code ignored;
+  if (std::filesystem::exists(name, ignored)) {
+    throw Error(ErrorKind::usage, {.file = name,
+                                   .found = "a file or folder",
+                                   .expected = "the name of a clip of " + library_.path().string(),
+                                   .remedy = "`kinespace build --add` adds clips to a library"});
   }
+  std::vector<std::string> names;
+  for (const ClipRow& row : library_.clips()) names.push_back(row.name);
+  const auto nearest = nearest_name(name, names);
+  const bool file = looks_like_a_file(name);
   throw Error(
-      ErrorKind::usage,
-      {.file = library_.path().string(),
-       .found = fmt::format("no clip \"{}\"", name),
-       .remedy = nearest.empty() ? "the library has no clips"
-                                 : fmt::format("the nearest name is \"{}\"; kinespace info lists all", nearest)});
+      file ? ErrorKind::bad_input : ErrorKind::usage,
+      {.file = file ? name : library_.path().string(),
+       .found = file ? "no such file, and no clip of that name in " + library_.path().string()
+                     : fmt::format("no clip \"{}\"", name),
+       .remedy = nearest ? fmt::format("the nearest name is \"{}\"; `kinespace info LIB --limit 0` lists all", *nearest)
+                         : "the library has no clips"});
 }
 
 const MotionSpace& LibraryView::space(std::int64_t space_id) {
@@ -116,16 +139,39 @@ Clip LibraryView::clip(const ClipRow& row, int functions) {
   return clip_from_curves(curves(row, functions), skeleton(row.skeleton_id));
 }
 
-int LibraryView::functions_for_error(const ClipRow& row, double max_error_cm) {
+std::optional<Clip> LibraryView::unchanged_source(const ClipRow& row) const {
+  const std::filesystem::path file = row.source;
+  std::error_code ignored;
+  if (!is_motion_file(file) || !std::filesystem::is_regular_file(file, ignored)) return std::nullopt;
+  try {
+    if (source_hash_of(file) != row.source_hash) return std::nullopt;
+    Clip clip = read_clip(file);
+    if (clip.frames != row.frames) return std::nullopt;
+    return clip;
+  } catch (const Error&) {
+    return std::nullopt;  // a skeleton that is not beside it any more, say: then the file is not what it was
+  }
+}
+
+LibraryView::LevelOfDetail LibraryView::level_for_error(const ClipRow& row, double max_error_cm) {
   const MotionSpace& s = space(row.space_id);
   const Skeleton& bones = skeleton(row.skeleton_id);
   const EncodedClip whole = encoded(row);
-  const JointPositions best = joint_positions(clip_from_curves(decode(s, whole), bones));
+  const std::optional<Clip> source = unchanged_source(row);
+  const JointPositions target = joint_positions(source ? *source : clip_from_curves(decode(s, whole), bones));
+  // The library keeps errors as 32-bit floats.
+  const double unseen_cm = source ? 0 : whole.error.max_joint_error_cm * (1 + 1e-6);
+  if (!std::isfinite(unseen_cm)) refuse_level(library_, row, "nothing", max_error_cm);
+  const auto error_of = [&](int n) {
+    return unseen_cm + largest_distance(target, joint_positions(clip_from_curves(decode(s, whole, n), bones)));
+  };
   // The error falls with n but for small waves, so the first n that is good enough is looked for one by one.
-  for (int n = 0; n < s.functions(); ++n) {
-    if (largest_distance(best, joint_positions(clip_from_curves(decode(s, whole, n), bones))) <= max_error_cm) return n;
+  double error = unseen_cm;
+  for (int n = 0; n <= s.functions() && unseen_cm <= max_error_cm; ++n) {
+    error = error_of(n);
+    if (error <= max_error_cm) return {n, error, source.has_value()};
   }
-  return s.functions();
+  refuse_level(library_, row, fmt::format("{:.3g} cm", error), max_error_cm);
 }
 
 void store_clip(Library& library, const ClipRow& row, const EncodedClip& clip, const MotionSpace& space,

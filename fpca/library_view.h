@@ -18,6 +18,10 @@ namespace kinespace {
 [[nodiscard]] std::string sequence_space_name(const std::string& tree_hash);
 [[nodiscard]] std::string clip_space_name(const std::string& tree_hash);
 
+// What ClipRow::source_hash holds: the content_hash of the file, for AMC with that of its skeleton file behind it.
+[[nodiscard]] std::string source_hash_of(const std::filesystem::path& file,
+                                         const std::optional<std::filesystem::path>& asf = {});
+
 class LibraryView {
  public:
   explicit LibraryView(const std::filesystem::path& path);
@@ -39,11 +43,20 @@ class LibraryView {
   [[nodiscard]] ClipCurves curves(const ClipRow& row, int functions = -1);
   [[nodiscard]] Clip clip(const ClipRow& row, int functions = -1);
 
-  // The fewest functions whose decoded clip is, at every joint and frame, within the given distance in cm of what all
-  // functions give.
-  [[nodiscard]] int functions_for_error(const ClipRow& row, double max_error_cm);
+  // The fewest functions whose decoded clip is, at every joint and frame, within the given distance in cm of the clip
+  // as it was read. Where the file it was read from is still there unchanged, that is measured; else it is the error
+  // that was measured when the library was built plus the distance from what all functions give, which is never less.
+  // Throws Error{usage} when even all functions do not come that near, or nothing is known of how near they come.
+  struct LevelOfDetail {
+    int functions = 0;
+    double max_error_cm = 0;     // of that level: measured, or a bound
+    bool from_the_file = false;  // measured against it
+  };
+  [[nodiscard]] LevelOfDetail level_for_error(const ClipRow& row, double max_error_cm);
 
  private:
+  [[nodiscard]] std::optional<Clip> unchanged_source(const ClipRow& row) const;
+
   Library library_;
   std::map<std::int64_t, MotionSpace> spaces_;
   std::map<std::int64_t, ClipSpace> clip_spaces_;

@@ -53,10 +53,19 @@ std::filesystem::path skeleton_of(const std::filesystem::path& amc) {
 
 [[noreturn]] void fail_ending(ErrorKind kind, const std::filesystem::path& path, const std::string& expected) {
   const std::string ending = path.extension().string();
+  std::error_code ignored;
+  const bool folder = std::filesystem::is_directory(path, ignored);
+  const bool gltf = kind == ErrorKind::bad_input && (has_ending(path, ".glb") || has_ending(path, ".gltf"));
   throw Error(kind, {.file = path.string(),
-                     .found = ending.empty() ? "no ending" : "the ending \"" + ending + "\"",
+                     .found = folder           ? "a folder"
+                              : gltf           ? "a glTF file, which is written only"
+                              : ending.empty() ? "no ending"
+                                               : "the ending \"" + ending + "\"",
                      .expected = expected,
-                     .remedy = has_ending(path, ".asf") ? "name the .amc file; its .asf is found" : ""});
+                     .remedy = folder                     ? "name a file in it"
+                               : has_ending(path, ".asf") ? "name the .amc file; its .asf is found"
+                               : gltf                     ? "give the clip that it was made of"
+                                                          : ""});
 }
 
 }  // namespace

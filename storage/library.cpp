@@ -1,5 +1,8 @@
 #include "storage/library.h"
 
+#include <charconv>
+#include <cmath>
+#include <system_error>
 #include <utility>
 
 #include "base/error.h"
@@ -28,7 +31,9 @@ void require_file(const std::filesystem::path& path) {
   if (std::filesystem::is_regular_file(status)) return;
   const bool exists = std::filesystem::exists(status);
   throw Error(ErrorKind::bad_input, {.file = path.string(),
-                                     .found = exists ? "not a regular file" : "no such file",
+                                     .found = std::filesystem::is_directory(status) ? "a folder"
+                                              : exists                              ? "not a regular file"
+                                                                                    : "no such file",
                                      .expected = "a library",
                                      .remedy = "check the path; `kinespace build` makes a library"});
 }
@@ -48,6 +53,20 @@ std::unique_ptr<Database> open_checked(const std::filesystem::path& path, Mode m
   auto database = std::make_unique<Database>(path, mode, path.string());
   schema::check(*database, schema::library());
   return database;
+}
+
+std::string unreadable(std::string_view key, const std::string& text, const char* expected) {
+  return "a damaged library: \"" + text.substr(0, 40) + "\" as the " + expected + " '" + std::string(key) + "'";
+}
+
+// All of `text` as a number; nullopt when it is none.
+template <class Number>
+std::optional<Number> whole_number(const std::string& text) {
+  const char* const end = text.data() + text.size();
+  Number value{};
+  const auto [at, code] = std::from_chars(text.data(), end, value);
+  if (code != std::errc() || at != end) return std::nullopt;
+  return value;
 }
 
 SkeletonRow skeleton_of(Statement& query) {
@@ -91,6 +110,22 @@ std::optional<std::string> Library::metadata(std::string_view key) const {
   Statement query = database_->prepare("SELECT value FROM metadata WHERE key = ?");
   if (!query.bind(1, key).step()) return std::nullopt;
   return query.text(0);
+}
+
+std::optional<double> Library::metadata_number(std::string_view key) const {
+  const auto text = metadata(key);
+  if (!text) return std::nullopt;
+  const auto value = whole_number<double>(*text);
+  if (!value || !std::isfinite(*value)) database_->damaged(unreadable(key, *text, "number"));
+  return value;
+}
+
+std::optional<std::int64_t> Library::metadata_count(std::string_view key) const {
+  const auto text = metadata(key);
+  if (!text) return std::nullopt;
+  const auto value = whole_number<std::int32_t>(*text);
+  if (!value || *value < 0) database_->damaged(unreadable(key, *text, "count"));
+  return value;
 }
 
 std::vector<std::pair<std::string, std::string>> Library::all_metadata() const {

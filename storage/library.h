@@ -55,6 +55,10 @@ class Library {
   void set_metadata(std::string_view key, std::string_view value);
   [[nodiscard]] std::optional<std::string> metadata(std::string_view key) const;
   [[nodiscard]] std::vector<std::pair<std::string, std::string>> all_metadata() const;  // by key
+  // A fact that is a number; nullopt when there is none. Throw Error{bad_input} when it is no number, or no count: a
+  // whole number from 0 to 2^31 - 1.
+  [[nodiscard]] std::optional<double> metadata_number(std::string_view key) const;
+  [[nodiscard]] std::optional<std::int64_t> metadata_count(std::string_view key) const;
 
   // Returns the id: that of the row that has the same tree and blob already, else a new one. row.id is not looked at.
   std::int64_t add_skeleton(const SkeletonRow& row);

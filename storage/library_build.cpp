@@ -165,14 +165,14 @@ void LibraryBuild::State::commit_keep() {
 void LibraryBuild::State::start_rows() {
   drop_rows();
   auto database = std::make_unique<Database>(beside(target, ".new"), Mode::create, shown);
-  if (options.extend) {
-    const Library old = Library::open_read_only(target);
-    database->copy_from(*old.database_);
-  }
   // Nobody reads this file before it is complete and flushed, and a kill throws it away: no flushes in between.
   database->execute("PRAGMA journal_mode=DELETE; PRAGMA synchronous=OFF");
-  if (!options.extend) schema::make(*database, schema::library());
+  schema::make(*database, schema::library());
   database->execute("BEGIN IMMEDIATE");
+  if (options.extend) {
+    const Library old = Library::open_read_only(target);
+    schema::copy_rows(*old.database_, *database, schema::library());
+  }
   rows.emplace(Library(target, std::move(database)));
 }
 

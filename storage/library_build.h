@@ -7,9 +7,10 @@
 //                        and the build starts over. Its lock keeps two builds of one library apart.
 //   LIB.kspace.new       the library's rows, once library() was called. Worth nothing after a kill; made anew.
 // finish() flushes the new file to the disk, renames it over the target and removes the partial one, so a reader sees
-// the old library or the new one; a process that has the old one open keeps reading it. Extending starts from a copy of
-// the old rows for the same reason: a transaction in place would have been as safe, but would make readers wait, and
-// the target could not stay readable on its own while a journal lies beside it.
+// the old library or the new one; a process that has the old one open keeps reading it. Extending copies the old rows
+// into a file made anew for the same reason: a transaction in place would have been as safe, but would make readers
+// wait, and the target could not stay readable on its own while a journal lies beside it. Rows, not pages, so that
+// nothing of a file that came from elsewhere survives but what is read from it.
 //
 //   LibraryBuild build("moves.kspace", {.fingerprint = options_text});
 //   for (file : files) {

@@ -30,8 +30,13 @@ struct Format {
 // Makes the tables in an empty database.
 void make(sqlite::Database& database, const Format& format);
 
-// Throws Error{bad_input} when the file is of another application, newer, cut short, or has other tables than ours or
-// things that run (triggers). Views and indices that a user added are left alone.
+// Copies the rows of every table, keys and all, from a database that was checked into one that was just made: nothing
+// of the old file but its rows comes along. One row is in memory at a time. Throws Error{bad_input} for rows that the
+// tables do not take, as only a damaged file has them.
+void copy_rows(sqlite::Database& from, sqlite::Database& to, const Format& format);
+
+// Throws Error{bad_input} when the file is of another application, newer or cut short, or when it has anything but our
+// tables and the indices that SQLite makes for their keys: no other table, index, view or trigger, whoever added it.
 void check(sqlite::Database& database, const Format& format);
 
 // Whether a file that starts so is marked as of that format.

@@ -82,6 +82,18 @@ constexpr const char* hardening =
     "PRAGMA trusted_schema=OFF; PRAGMA cell_size_check=ON; PRAGMA foreign_keys=ON; PRAGMA mmap_size=0;"
     "PRAGMA cache_size=-16384";
 
+// A statement for a pass over whole rows of whatever type.
+struct Prepared {
+  Prepared(const Connection& connection, const std::string& sql) {
+    check(connection, sqlite3_prepare_v2(connection.handle, sql.c_str(), -1, &statement, nullptr));
+  }
+  ~Prepared() { sqlite3_finalize(statement); }
+  Prepared(const Prepared&) = delete;
+  Prepared& operator=(const Prepared&) = delete;
+
+  sqlite3_stmt* statement = nullptr;
+};
+
 sqlite3_file* file_of(const Connection& connection) {
   sqlite3_file* file = nullptr;
   check(connection, sqlite3_file_control(connection.handle, "main", SQLITE_FCNTL_FILE_POINTER, &file));
@@ -245,11 +257,24 @@ void Database::read_start(std::span<std::byte> out) const {
   check(*connection_, file->pMethods->xRead(file, out.data(), static_cast<int>(out.size()), 0));
 }
 
-void Database::copy_from(const Database& other) {
-  sqlite3_backup* copying = sqlite3_backup_init(connection_->handle, "main", other.connection_->handle, "main");
-  if (copying == nullptr) fail(*connection_, sqlite3_extended_errcode(connection_->handle));
-  sqlite3_backup_step(copying, -1);
-  check(*connection_, sqlite3_backup_finish(copying));  // reports what went wrong in the step
+void Database::copy_rows(const Database& other, const std::string& table) {
+  const Prepared read(*other.connection_, "SELECT * FROM " + table);
+  const int columns = sqlite3_column_count(read.statement);
+  std::string places = "?";
+  for (int i = 1; i < columns; ++i) places += ", ?";
+  const Prepared write(*connection_, "INSERT INTO " + table + " VALUES(" + places + ")");
+  for (;;) {
+    const int got = sqlite3_step(read.statement);
+    if (got == SQLITE_DONE) return;
+    if (got != SQLITE_ROW) fail(*other.connection_, got);
+    for (int i = 0; i < columns; ++i) {
+      check(*connection_, sqlite3_bind_value(write.statement, i + 1, sqlite3_column_value(read.statement, i)));
+    }
+    const int put = sqlite3_step(write.statement);
+    if ((put & 0xff) == SQLITE_CONSTRAINT) other.damaged("a damaged library: a row of " + table + " that cannot be");
+    if (put != SQLITE_DONE) fail(*connection_, put);
+    sqlite3_reset(write.statement);
+  }
 }
 
 const std::string& Database::shown() const {

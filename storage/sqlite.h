@@ -78,8 +78,9 @@ class Database {
   [[nodiscard]] std::uint64_t file_size() const;
   void read_start(std::span<std::byte> out) const;
 
-  // Makes this database, which must be empty, a copy of another.
-  void copy_from(const Database& other);
+  // Adds all rows of a table of `other` to that of the same name and columns here, one by one. Throws Error{bad_input}
+  // about `other` when it has rows that this table does not take.
+  void copy_rows(const Database& other, const std::string& table);
 
   [[nodiscard]] const std::string& shown() const;
   // Throws Error{bad_input}: the file is not what it should be.

@@ -17,7 +17,7 @@ std::vector<ClipRow> clips_of_one_tree(const LibraryView& library, std::span<con
                 {.file = library.library().path().string(),
                  .found = fmt::format("{} and {} of different skeletons", rows.front().name, row.name),
                  .expected = "clips of one joint tree",
-                 .remedy = "`kinespace info LIB` lists the skeletons"});
+                 .remedy = "`kinespace info LIB --limit 0` lists which clip has which skeleton"});
   }
   return rows;
 }

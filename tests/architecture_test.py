@@ -13,6 +13,7 @@ import tempfile
 # The arrows: what each folder may include beside itself. A new folder gets a line here.
 ARROWS = {
     "base": "",
+    "cmake": "",
     "motion": "base",
     "storage": "base",
     "kernels": "base",
@@ -29,8 +30,11 @@ ARROWS = {
 ARROWS = {folder: set(others.split()) | {folder} for folder, others in ARROWS.items()}
 
 LONGEST_FILE = 500
-# What reads numbers by the locale of the process, which is the user's business and not a file's.
-LOCALE_BOUND = re.compile(r"\b(?:std::)?(?:stod|stof|stold|strtod|strtof|strtold|atof|sscanf|fscanf|setlocale)\s*\(")
+# What reads numbers by the locale of the process, which is the user's business and not a file's, or answers what is no number with an exception of its own, with 0 or with undefined behaviour.
+NUMBER_READERS = re.compile(r"\b(?:std::)?(?:sto(?:i|l|ll|ul|ull|f|d|ld)|ato(?:i|l|ll|f)|strto(?:l|ll|ul|ull|f|d|ld|imax|umax)|v?[fs]?w?scanf)\s*\(")
+SETS_LOCALE = re.compile(r"\bsetlocale\s*\(")
+# Streams, by the name they are declared with: what is read from them with >> obeys the locale and fails without a word.
+STREAMS = re.compile(r"\bstd::w?(?:istream|iostream|i?fstream|i?stringstream)\s*&?\s*(\w+)")
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 CATCH_ALL = re.compile(r"catch\s*\(\s*\.\.\.\s*\)\s*\{")
 LEFT_OPEN = re.compile(r"\b(?:TODO|FIXME|XXX|HACK)\b")
@@ -82,11 +86,15 @@ def catch_all(root, file, text):
 
 
 def locale(root, file, text):
-    if file.parts[0] == "tests":
-        return  # they set a comma locale on purpose
-    found = LOCALE_BOUND.search(without_comments(text))
-    if found:
-        yield f"{found.group(0)}...) obeys the locale; parse with from_chars"
+    code = without_comments(text)
+    if found := NUMBER_READERS.search(code):
+        yield f"{found.group(0)}...) obeys the locale or throws what is no Error; parse with from_chars"
+    for stream in sorted({"std::cin", *STREAMS.findall(code)}):
+        if re.search(rf"\b{stream}\s*>>", code):
+            yield f"{stream} >> ... reads numbers by the locale; take lines and parse with from_chars"
+    # Tests set a comma locale on purpose.
+    if file.parts[0] != "tests" and (found := SETS_LOCALE.search(code)):
+        yield f"{found.group(0)}...) changes how numbers look; no code of ours depends on the locale"
 
 
 def left_open(root, file, text):
@@ -133,6 +141,13 @@ BREACHES = [
     (length, "base/long.cpp", "\n" * (LONGEST_FILE + 1), "more than one idea"),
     (catch_all, "base/mute.cpp", "void f() { try { g(); } catch (...) { /* throw; */ } }\n", "neither rethrows nor reports"),
     (locale, "motion/parse.cpp", "double x = std::stod(word);\n", "obeys the locale"),
+    (locale, "fpca/rows.cpp", "sequences += std::stoll(*before);\n", "obeys the locale"),
+    (locale, "cli/count.cpp", "int n = atoi(word);\n", "obeys the locale"),
+    (locale, "mesh/count.cpp", "long n = strtol(word, nullptr, 10);\n", "obeys the locale"),
+    (locale, "tests/base/scan_test.cpp", 'std::sscanf(line, "%d", &n);\n', "obeys the locale"),
+    (locale, "bench/words.cpp", "std::istringstream words(line); words >> number;\n", "by the locale"),
+    (locale, "codecs/read.h", "#pragma once\nvoid read(std::istream& in, int& n) { in >> n; }\n", "by the locale"),
+    (locale, "motion/comma.cpp", 'setlocale(LC_ALL, "");\n', "changes how numbers look"),
     (left_open, "base/later.cpp", "// TO" + "DO: finish\n", "left in"),
     (guarded, "base/twice.h", "int x();\n", "without #pragma once"),
 ]

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -51,7 +53,11 @@ bool catches(pid_t child, int signal) {
   std::ifstream status(fmt::format("/proc/{}/status", child));
   std::string line;
   while (std::getline(status, line)) {
-    if (line.starts_with("SigCgt:")) return ((std::stoull(line.substr(7), nullptr, 16) >> (signal - 1)) & 1U) != 0;
+    if (!line.starts_with("SigCgt:")) continue;
+    const std::size_t digits = std::min(line.find_first_not_of(" \t", 7), line.size());
+    std::uint64_t caught = 0;
+    std::from_chars(line.data() + digits, line.data() + line.size(), caught, 16);
+    return ((caught >> (signal - 1)) & 1U) != 0;
   }
   return false;
 }

@@ -12,7 +12,7 @@ namespace {
 // What is left of the skate where the feet truly stand.
 double slide_left(const Clip& clean, const SampleMotion& truth) {
   const Feet feet = require_feet(clean);
-  return foot_slide_cm_s(foot_tracks(clean, feet), contacts_of(truth, feet));
+  return foot_slide_cm_s(foot_tracks(clean, feet), contacts_of(truth, feet)).value_or(0);
 }
 
 TEST(Cleanup, takes_known_skate_out_and_keeps_poses_and_accelerations) {
@@ -129,7 +129,7 @@ TEST(Cleanup, of_one_frame_is_that_frame) {
   const Clip one = slice(make_walk().clip, 10, 1);
   const CleanResult result = clean(one);
   EXPECT_LE(largest_move_cm(one, result.clip), 0.1);
-  EXPECT_EQ(result.report.foot_slide_after_cm_s, 0);
+  EXPECT_EQ(result.report.foot_slide_after_cm_s, std::nullopt) << "there is no step from a frame to the next";
 }
 
 TEST(Cleanup, of_a_clip_in_which_nothing_touches_changes_nothing) {
@@ -139,6 +139,24 @@ TEST(Cleanup, of_a_clip_in_which_nothing_touches_changes_nothing) {
   const CleanResult result = clean(flying);
   EXPECT_TRUE(result.report.plants.empty());
   EXPECT_LE(largest_move_cm(flying, result.clip), 1e-6);
+  EXPECT_EQ(result.report.foot_slide_before_cm_s, std::nullopt);
+  EXPECT_EQ(result.report.foot_slide_after_cm_s, std::nullopt);
+  ASSERT_EQ(doubts_about(result.report).size(), 1U);
+  EXPECT_THAT(doubts_about(result.report)[0], testing::HasSubstr("not known"));
+  EXPECT_EQ(compare_skate(flying, flying)->foot_slide_cm_s, std::nullopt);
+}
+
+TEST(Cleanup, says_when_it_made_things_worse) {
+  const CleanReport good = clean(test::with_path_scaled(make_walk().clip, 1.15)).report;
+  EXPECT_THAT(doubts_about(good), testing::IsEmpty());
+  CleanReport sliding = good;
+  sliding.foot_slide_after_cm_s = *good.foot_slide_before_cm_s + 1;
+  ASSERT_EQ(doubts_about(sliding).size(), 1U);
+  EXPECT_THAT(doubts_about(sliding)[0], testing::HasSubstr("slide more than before"));
+  CleanReport jerked = good;
+  jerked.acceleration_ratio = 1.51;
+  ASSERT_EQ(doubts_about(jerked).size(), 1U);
+  EXPECT_THAT(doubts_about(jerked)[0], testing::HasSubstr("1.5 times"));
 }
 
 TEST(Cleanup, of_a_skeleton_without_feet_says_how_to_name_them) {
@@ -163,11 +181,11 @@ TEST(SkateMeasures, of_a_scaled_path_are_what_was_put_in) {
   const SampleMotion walk = make_walk({.duration_s = 5, .take = {.variation = 0}});
   const auto skate = compare_skate(walk.clip, test::with_path_scaled(walk.clip, 0.9));
   ASSERT_TRUE(skate);
-  EXPECT_NEAR(skate->foot_slide_cm_s, 13, 1.5);
+  EXPECT_NEAR(skate->foot_slide_cm_s.value(), 13, 1.5);
   EXPECT_NEAR(skate->floor_penetration_cm, 0, 0.05);
   const auto sunk = compare_skate(walk.clip, test::raised(walk.clip, -4));
   EXPECT_NEAR(sunk->floor_penetration_cm, 4, 0.05);
-  EXPECT_NEAR(sunk->foot_slide_cm_s, 0, 0.2);
+  EXPECT_NEAR(sunk->foot_slide_cm_s.value(), 0, 0.2);
 }
 
 TEST(SkateMeasures, pose_change_does_not_count_travel_and_turn) {

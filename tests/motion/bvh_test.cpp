@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "motion/kinematics.h"
+#include "motion/text.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/support/data.h"
 
@@ -213,9 +214,13 @@ TEST(Bvh, written_angles_do_not_jump) {
   std::getline(lines, line);
   std::vector<double> before;
   while (std::getline(lines, line)) {
-    std::istringstream words(line);
     std::vector<double> row;
-    for (double value = 0; words >> value;) row.push_back(value);
+    const char* at = line.data();
+    const char* const end = at + line.size();
+    for (double value = 0; (at = scan_number(at, end, value)) != nullptr;) {
+      row.push_back(value);
+      while (at != end && is_space(*at)) ++at;
+    }
     for (std::size_t i = 0; i < before.size(); ++i) ASSERT_LT(std::abs(row[i] - before[i]), 100);
     before = row;
   }

@@ -257,7 +257,7 @@ TEST(Library, a_file_that_is_none_is_said_to_be_none) {
   write_file_atomically(folder / "short", std::string_view("SQLite format 3"));
   std::filesystem::create_directory(folder / "directory");
   EXPECT_THAT(message("missing"), HasSubstr("no such file"));
-  EXPECT_THAT(message("directory"), HasSubstr("not a regular file"));
+  EXPECT_THAT(message("directory"), HasSubstr("a folder"));
   EXPECT_THAT(message("empty"), HasSubstr("an empty file"));
   EXPECT_THAT(message("text"), HasSubstr("not a kinespace library"));
   EXPECT_THAT(message("short"), HasSubstr("not a kinespace library"));
