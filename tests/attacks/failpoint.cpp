@@ -6,6 +6,7 @@
 //   KINESPACE_FAILPOINT_COUNT=F   at the end, the numbers of both kinds of calls are written into file F
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <csignal>
 #include <cstdarg>
 #include <cstdio>
@@ -37,7 +38,7 @@ std::atomic<long> changes{0};
 __attribute__((constructor)) void begin() {
   if (const char* text = std::getenv("KINESPACE_FAILPOINT")) {
     const char* number = std::strchr(text, ':');
-    wanted = number == nullptr ? 0 : std::strtol(number + 1, nullptr, 10);
+    if (number != nullptr) std::from_chars(number + 1, text + std::strlen(text), wanted);
     wish = std::strncmp(text, "alloc", 5) == 0  ? Wish::alloc
            : std::strncmp(text, "disk", 4) == 0 ? Wish::disk
                                                 : Wish::kill;
