@@ -5,7 +5,7 @@
 // own settings or by a target that it then meets. A decoded clip is a full clip: name, rate, skeleton, root, rotations,
 // and the translations of joints that move.
 //
-//   const Bytes stream = encode("motion-space", clips, {.target = {.mean_error_cm = 0.5}});       codecs/registry.h
+//   const Bytes stream = encode("motion-space", clips, {.target = {.mean_error_cm = 0.5}});   // codecs/registry.h
 //   const auto reader = open_stream(stream, "dance.ksm");
 //   const Clip clip = reader->decode(0);
 #pragma once

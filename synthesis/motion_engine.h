@@ -1,14 +1,16 @@
 // All that a game, a tool or a script asks of a library of motions, in one place.
 //
 //   kinespace::MotionEngine engine("moves.kspace");
-//   auto near   = engine.nearest(kinespace::read_clip("take.bvh"), {.k = 3});          // what is this like?
-//   auto player = engine.play("walk_normal_001");                                      // pose by pose, any detail
-//   auto root   = player.pose(1.25, 5, rotations);                                     // 5 functions: far from the
-//   camera auto mix    = engine.blend({"walk_slow_001", "walk_fast_001"}, {.weights = {{0.3, 0.7}}}); auto on     =
-//   engine.transition({"walk_normal_001", "run_fast_002"});              // one into the other auto far    =
-//   engine.transition({"stand_calm_001", "run_fast_002"}, {.via_graph = true});  // through others auto whole  =
-//   engine.fill(take, {.first_frame = 30, .last_frame = 75});                        // frames that are missing
-//   kinespace::write_clip("out.bvh", on->transition.clip);
+//   const kinespace::Clip take = kinespace::read_clip("take.bvh");
+//   const auto near = engine.nearest(take, {.k = 3});                                    // what is this like?
+//   const auto player = engine.play("walk_normal_001");                                  // pose by pose, any detail
+//   std::vector<float> rotations(4 * static_cast<std::size_t>(player.joints()));
+//   const auto root = player.pose(1.25, 5, rotations);                                   // 5 functions, from afar
+//   const auto mix = engine.blend({"walk_slow_001", "walk_fast_001"}, {.weights = {{0.3, 0.7}}});
+//   const auto on = engine.transition({"walk_normal_001", "run_fast_002"});              // one into the other
+//   const auto far = engine.transition({"stand_calm_001", "run_fast_002"}, {.via_graph = true});   // through others
+//   const auto whole = engine.fill(take, {.first_frame = 30, .last_frame = 75});         // frames that are missing
+//   if (on) kinespace::write_clip("out.bvh", on->transition.clip);
 //
 // Each call is a thin layer over the header that is named beside it, where its options, errors and results are
 // explained. An engine is for one thread at a time; players may be used by many.
