@@ -137,9 +137,12 @@ void run_encode(MeshEncodeOptions& options, Session& session) {
   const double seconds = seconds_since(start);
   session.finish_progress();
   Session::check_stop();
-  write_file_atomically(options.output, std::span<const std::byte>(stream));
+  // Opened before it is written: what cannot be read is not left behind.
+  stop_at_once_unless(options.library);
   Json result{{"codec", options.codec}, {"output", options.output.string()}};
   result.update(stream_fields(*OpenStream(stream, options.output, options.library, session)));
+  catch_stop_signals();
+  write_file_atomically(options.output, std::span<const std::byte>(stream));
   result["encode_s"] = seconds;
   print(result, options.json);
 }
