@@ -59,11 +59,34 @@ void add_library(CLI::App& command, std::optional<fs::path>& library) {
       "Keep the stream's smooth functions in this library (made if there is none), or take them from it");
 }
 
+void add_max_memory(CLI::App& command, std::optional<double>& megabytes) {
+  command
+      .add_option("--max-memory", megabytes,
+                  "Let one glTF file take so many MB of memory (64 times its size and 268 MB)")
+      ->check(CLI::Range(1.0, 1e9));
+}
+
+MeshReadOptions reading(const std::optional<double>& megabytes, Session& session) {
+  MeshReadOptions out;
+  if (megabytes) out.most_bytes = static_cast<std::uint64_t>(*megabytes * 1e6);
+  out.progress = session.progress();
+  return out;
+}
+
+// For what comes before the first byte is written: a signal then ends the program, however long a step takes. A library
+// is written to at any time.
+void stop_at_once_unless(const std::optional<fs::path>& library) {
+  if (library) return;
+  stop_at_once();
+  Session::check_stop();
+}
+
 // A sequence of files, or of a stream.
-MeshSequence read_any(const fs::path& path, const std::optional<fs::path>& library, Session& session) {
-  if (!is_stream_file(path)) return read_mesh_sequence(path);
+MeshSequence read_any(const fs::path& path, const std::optional<fs::path>& library, const MeshReadOptions& options,
+                      Session& session) {
+  if (!is_stream_file(path)) return read_mesh_sequence(path, options);
   const FileContent file(path);
-  return OpenStream(file.bytes(), path, library, session)->decode_all();
+  return OpenStream(file.bytes(), path, library, session)->decode_all(options.progress);
 }
 
 // Null where the stream has none: a measure that its sequence leaves open.
@@ -98,12 +121,15 @@ struct MeshEncodeOptions {
   std::string profile = "standard";
   MeshCodecOptions codec_options;
   std::optional<double> rate_hz;
+  std::optional<double> max_memory;
   std::optional<fs::path> library;
   bool json = false;
 };
 
 void run_encode(MeshEncodeOptions& options, Session& session) {
-  const MeshSequence mesh = read_mesh_sequence(options.input, options.rate_hz);
+  MeshReadOptions read = reading(options.max_memory, session);
+  read.rate_hz = options.rate_hz;
+  const MeshSequence mesh = read_mesh_sequence(options.input, read);
   options.codec_options.profile = options.profile == "paper" ? MeshProfile::paper : MeshProfile::standard;
   options.codec_options.progress = session.progress();
   const auto start = Clock::now();
@@ -111,9 +137,12 @@ void run_encode(MeshEncodeOptions& options, Session& session) {
   const double seconds = seconds_since(start);
   session.finish_progress();
   Session::check_stop();
-  write_file_atomically(options.output, std::span<const std::byte>(stream));
+  // Opened before it is written: what cannot be read is not left behind.
+  stop_at_once_unless(options.library);
   Json result{{"codec", options.codec}, {"output", options.output.string()}};
   result.update(stream_fields(*OpenStream(stream, options.output, options.library, session)));
+  catch_stop_signals();
+  write_file_atomically(options.output, std::span<const std::byte>(stream));
   result["encode_s"] = seconds;
   print(result, options.json);
 }
@@ -135,6 +164,7 @@ MeshFormat format_of(const fs::path& output, const std::string& format) {
 }
 
 void run_decode(const MeshDecodeOptions& options, const std::string& format, Session& session) {
+  stop_at_once_unless(options.library);
   const FileContent file(options.stream);
   const auto start = Clock::now();
   const OpenStream reader(file.bytes(), options.stream, options.library, session);
@@ -145,8 +175,9 @@ void run_decode(const MeshDecodeOptions& options, const std::string& format, Ses
   const auto decoding = Clock::now();
   const MeshSequence mesh = reader->decode(first, last - first + 1, progress);
   const double seconds = seconds_since(decoding);
+  catch_stop_signals();
+  write_mesh_sequence(options.output, mesh, format_of(options.output, format), progress);
   session.finish_progress();
-  write_mesh_sequence(options.output, mesh, format_of(options.output, format));
   print({{"output", options.output.string()},
          {"vertices", mesh.vertices},
          {"triangles", mesh.triangles.size()},
@@ -162,6 +193,7 @@ struct MeshCompareOptions {
   fs::path reference, other;
   std::optional<fs::path> picture;
   std::optional<int> frame;
+  std::optional<double> max_memory;
   std::optional<fs::path> library;
   bool json = false;
 };
@@ -182,10 +214,13 @@ int worst_frame(const MeshSequence& a, const MeshSequence& b) {
 }
 
 void run_compare(const MeshCompareOptions& options, Session& session) {
-  const MeshSequence a = read_any(options.reference, options.library, session);
+  stop_at_once_unless(options.library);
+  const MeshReadOptions read = reading(options.max_memory, session);
+  const MeshSequence a = read_any(options.reference, options.library, read, session);
   Session::check_stop();
-  const MeshSequence b = read_any(options.other, options.library, session);
+  const MeshSequence b = read_any(options.other, options.library, read, session);
   Session::check_stop();
+  session.finish_progress();
   const MeshError error = compare(a, b);
   Json result{{"vertices", error.vertices},
               {"triangles", a.triangles.size()},
@@ -209,6 +244,7 @@ void run_compare(const MeshCompareOptions& options, Session& session) {
   if (options.picture) {
     const int frame = options.frame.value_or(worst_frame(a, b));
     const ComparisonPicture drawn = draw_comparison(a, b, frame);
+    catch_stop_signals();
     write_png(*options.picture, drawn.picture);
     result["picture"] = options.picture->string();
     result["picture_frame"] = frame;
@@ -219,11 +255,13 @@ void run_compare(const MeshCompareOptions& options, Session& session) {
 
 struct MeshInfoOptions {
   fs::path file;
+  std::optional<double> max_memory;
   bool json = false;
 };
 
-Json describe_sequence(const fs::path& path) {
-  const MeshReport found = report(read_mesh_sequence(path));
+Json describe_sequence(const MeshInfoOptions& options, Session& session) {
+  const MeshReport found = report(read_mesh_sequence(options.file, reading(options.max_memory, session)));
+  session.finish_progress();
   return {{"kind", "mesh"},
           {"vertices", found.vertices},
           {"triangles", found.triangles},
@@ -243,8 +281,9 @@ Json describe_sequence(const fs::path& path) {
           {"isolated_vertices", found.isolated_vertices}};
 }
 
-void run_info(const MeshInfoOptions& options) {
-  if (!is_stream_file(options.file)) return print(describe_sequence(options.file), options.json);
+void run_info(const MeshInfoOptions& options, Session& session) {
+  stop_at_once_unless({});
+  if (!is_stream_file(options.file)) return print(describe_sequence(options, session), options.json);
   const FileContent file(options.file);
   const auto reader = open_mesh_stream(file.bytes(), options.file.string());
   const std::string& kind = reader->stream().kind();
@@ -273,6 +312,7 @@ void add_mesh_encode(CLI::App& mesh, Session& session) {
   command->add_option("--multi-resolution", codec.coarse_vertices,
                       "Code about so many vertices (10000, say); the others follow them");
   command->add_option("--rate", options->rate_hz, "Frames a second, where the files do not tell");
+  add_max_memory(*command, options->max_memory);
   add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
   session.files.reads(command, {"IN"});
@@ -307,6 +347,7 @@ void add_mesh_compare(CLI::App& mesh, Session& session) {
   command->add_option("B", options->other, "The sequence to judge: files or a stream")->required();
   command->add_option("--picture", options->picture, "Draw original, decoded and error (blue to red) to this PNG");
   command->add_option("--frame", options->frame, "The frame to draw; by default the one with the largest error");
+  add_max_memory(*command, options->max_memory);
   add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the measures as one JSON object");
   session.files.reads(command, {"A", "B"});
@@ -319,9 +360,10 @@ void add_mesh_info(CLI::App& mesh, Session& session) {
   CLI::App* command = mesh.add_subcommand("info", "What a mesh sequence or a stream of one holds");
   const auto options = std::make_shared<MeshInfoOptions>();
   command->add_option("FILE", options->file, "Files of a sequence, or a stream")->required();
+  add_max_memory(*command, options->max_memory);
   command->add_flag("--json", options->json, "Print the result as one JSON object");
   session.files.reads(command, {"FILE"});
-  command->callback([options] { run_info(*options); });
+  command->callback([options, &session] { run_info(*options, session); });
 }
 
 }  // namespace

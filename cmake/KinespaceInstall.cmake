@@ -17,7 +17,8 @@ foreach(module IN LISTS installed_modules)
   target_link_libraries(kinespace_all INTERFACE kinespace_${module})
   list(APPEND installed_targets kinespace_${module})
   get_target_property(folder kinespace_${module} SOURCE_DIR)
-  install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/kinespace FILES_MATCHING PATTERN "*.h")
+  install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/kinespace FILES_MATCHING PATTERN "*.h"
+          REGEX "gltf/(tiny|arrays|fields)\\.h$" EXCLUDE)  # of libraries that their users need not have
 endforeach()
 install(TARGETS kinespace_command RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ${installed_targets} EXPORT kinespaceTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
@@ -53,5 +54,5 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS pocl-opencl-icd)
 # For programs built on the libraries: what kinespaceConfig.cmake and kinespace.pc look for.
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libeigen3-dev, libarmadillo-dev, libopenblas-dev, libalglib-dev, ocl-icd-opencl-dev, \
-opencl-clhpp-headers, libfmt-dev, libtbb-dev, libxxhash-dev, libzstd-dev, liblzma-dev, libsqlite3-dev, libtinygltf-dev, libdraco-dev, libmeshoptimizer-dev, libpng-dev, nlohmann-json3-dev, pkg-config")
+opencl-clhpp-headers, libfmt-dev, libtbb-dev, libxxhash-dev, libzstd-dev, liblzma-dev, libsqlite3-dev, libdraco-dev, libmeshoptimizer-dev, libpng-dev, nlohmann-json3-dev, pkg-config")
 include(CPack)

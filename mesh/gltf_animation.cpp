@@ -5,7 +5,6 @@
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <tiny_gltf.h>
 
 #include "mesh/mesh_sequence.h"
 
@@ -42,26 +41,21 @@ std::vector<double> on_spline(const GltfChannel& c, std::size_t i, double t, dou
   return out;
 }
 
-GltfChannel channel_of(const tinygltf::Model& model, const tinygltf::Animation& animation,
-                       const tinygltf::AnimationChannel& from, const GltfAccessors& accessors) {
-  if (from.target_node < 0 || static_cast<std::size_t>(from.target_node) >= model.nodes.size()) {
-    accessors.fail(fmt::format("an animation of node {}", from.target_node), "a node of the file");
+GltfChannel channel_of(const gltf::Document& document, const gltf::Animation& animation,
+                       const gltf::Animation::Channel& from, const gltf::Accessors& accessors) {
+  if (static_cast<std::size_t>(from.node) >= document.nodes.size()) {
+    accessors.fail(fmt::format("an animation of node {}", from.node), "a node of the file");
   }
   if (from.sampler < 0 || static_cast<std::size_t>(from.sampler) >= animation.samplers.size()) {
     accessors.fail(fmt::format("animation sampler {}", from.sampler),
                    fmt::format("fewer than {}", animation.samplers.size()));
   }
-  const tinygltf::AnimationSampler& sampler = animation.samplers[static_cast<std::size_t>(from.sampler)];
+  const gltf::Animation::Sampler& sampler = animation.samplers[static_cast<std::size_t>(from.sampler)];
   GltfChannel out;
-  out.node = from.target_node;
-  const bool spline = sampler.interpolation == "CUBICSPLINE";
-  out.interpolation = spline                            ? GltfChannel::Interpolation::cubic
-                      : sampler.interpolation == "STEP" ? GltfChannel::Interpolation::step
-                                                        : GltfChannel::Interpolation::linear;
-  out.path = from.target_path == "rotation"  ? GltfChannel::Path::rotation
-             : from.target_path == "scale"   ? GltfChannel::Path::scale
-             : from.target_path == "weights" ? GltfChannel::Path::weights
-                                             : GltfChannel::Path::translation;
+  out.node = from.node;
+  out.interpolation = sampler.interpolation;
+  out.path = from.path;
+  const bool spline = out.interpolation == GltfChannel::Interpolation::cubic;
   out.times = accessors.floats(sampler.input, 1);
   const int width = out.path == GltfChannel::Path::rotation ? 4 : out.path == GltfChannel::Path::weights ? 1 : 3;
   out.values = accessors.floats(sampler.output, width);
@@ -91,29 +85,27 @@ double rate_of_even(const std::vector<float>& times) {
   return std::round(1000 / step) / 1000;  // what 32-bit times blurred
 }
 
-Eigen::Matrix4d local_of(const tinygltf::Node& node) {
-  if (node.matrix.size() == 16) return Eigen::Map<const Eigen::Matrix4d>(node.matrix.data());
+Eigen::Matrix4d local_of(const gltf::Placement& node) {
+  if (node.matrix) return Eigen::Map<const Eigen::Matrix4d>(node.matrix->data());
   Eigen::Affine3d out = Eigen::Affine3d::Identity();
-  if (node.translation.size() == 3) out.translate(Eigen::Map<const Eigen::Vector3d>(node.translation.data()));
-  if (node.rotation.size() == 4) {
-    const auto& q = node.rotation;
-    out.rotate(Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized());
-  }
-  if (node.scale.size() == 3) out.scale(Eigen::Map<const Eigen::Vector3d>(node.scale.data()));
+  out.translate(Eigen::Map<const Eigen::Vector3d>(node.translation.data()));
+  const auto& q = node.rotation;
+  out.rotate(Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized());
+  out.scale(Eigen::Map<const Eigen::Vector3d>(node.scale.data()));
   return out.matrix();
 }
 
-void apply(const GltfChannel& channel, double time, tinygltf::Node& node) {
+void apply(const GltfChannel& channel, double time, gltf::Placement& node) {
   std::vector<double> value = channel.at(time);
   switch (channel.path) {
     case GltfChannel::Path::translation:
-      node.translation = std::move(value);
+      std::copy_n(value.begin(), 3, node.translation.begin());
       break;
     case GltfChannel::Path::rotation:
-      node.rotation = std::move(value);
+      std::copy_n(value.begin(), 4, node.rotation.begin());
       break;
     case GltfChannel::Path::scale:
-      node.scale = std::move(value);
+      std::copy_n(value.begin(), 3, node.scale.begin());
       break;
     case GltfChannel::Path::weights:
       node.weights = std::move(value);
@@ -139,17 +131,16 @@ std::vector<double> GltfChannel::at(double time) const {
   return interpolation == Interpolation::cubic ? on_spline(*this, i, t, span) : blended(*this, i, t);
 }
 
-GltfAnimation::GltfAnimation(const tinygltf::Model& model, const GltfAccessors& accessors) {
-  if (model.animations.empty()) return;
-  const tinygltf::Animation& animation = model.animations.front();
-  for (const tinygltf::AnimationChannel& channel : animation.channels) {
-    const bool known = channel.target_path == "translation" || channel.target_path == "rotation" ||
-                       channel.target_path == "scale" || channel.target_path == "weights";
-    if (known && channel.target_node >= 0) channels_.push_back(channel_of(model, animation, channel, accessors));
+GltfAnimation::GltfAnimation(const gltf::Document& document, const gltf::Accessors& accessors) {
+  if (document.animations.empty()) return;
+  const gltf::Animation& animation = document.animations.front();
+  accessors.budget().take("animation channels", animation.channels.size(), 2 * sizeof(GltfChannel));
+  for (const gltf::Animation::Channel& channel : animation.channels) {
+    channels_.push_back(channel_of(document, animation, channel, accessors));
   }
 }
 
-GltfAnimation::Times GltfAnimation::times(std::optional<double> rate_hz, const GltfAccessors& accessors) const {
+GltfAnimation::Times GltfAnimation::times(std::optional<double> rate_hz, const gltf::Accessors& accessors) const {
   if (channels_.empty()) return {{0.0}, rate_hz.value_or(MeshSequence::usual_rate_hz)};
   bool shared = true;
   double first = static_cast<double>(channels_[0].times.front()), last = static_cast<double>(channels_[0].times.back());
@@ -166,38 +157,33 @@ GltfAnimation::Times GltfAnimation::times(std::optional<double> rate_hz, const G
     accessors.fail(fmt::format("an animation of {} s", last - first), fmt::format("at most {} frames", most_frames),
                    "give a lower rate");
   }
+  accessors.budget().take("frames", static_cast<std::uint64_t>(frames), sizeof(double));
   for (std::size_t f = 0; f < static_cast<std::size_t>(frames); ++f) {
     out.at.push_back(std::min(first + static_cast<double>(f) / out.rate_hz, last));
   }
   return out;
 }
 
-GltfPose gltf_pose(const tinygltf::Model& model, const GltfAnimation& animation, double time) {
-  std::vector<tinygltf::Node> posed(model.nodes.size());
-  for (std::size_t n = 0; n < posed.size(); ++n) {
-    const tinygltf::Node& node = model.nodes[n];
-    posed[n].matrix = node.matrix;
-    posed[n].translation = node.translation;
-    posed[n].rotation = node.rotation;
-    posed[n].scale = node.scale;
-    posed[n].weights = node.weights;
-  }
+GltfPose gltf_pose(const gltf::Document& document, const GltfAnimation& animation, double time) {
+  std::vector<gltf::Placement> posed;
+  posed.reserve(document.nodes.size());
+  for (const gltf::Node& node : document.nodes) posed.push_back(node.rest);
   for (const GltfChannel& channel : animation.channels()) {
     apply(channel, time, posed[static_cast<std::size_t>(channel.node)]);
   }
   GltfPose out;
-  for (tinygltf::Node& node : posed) {
+  for (gltf::Placement& node : posed) {
     out.local.push_back(local_of(node));
     out.weights.push_back(std::move(node.weights));
   }
   return out;
 }
 
-std::vector<int> gltf_order(const tinygltf::Model& model, const GltfAccessors& accessors) {
-  std::vector<int> parent(model.nodes.size(), -1), out;
-  for (std::size_t n = 0; n < model.nodes.size(); ++n) {
-    for (const int child : model.nodes[n].children) {
-      const bool good = child >= 0 && static_cast<std::size_t>(child) < model.nodes.size() &&
+std::vector<int> gltf_order(const gltf::Document& document, const gltf::Accessors& accessors) {
+  std::vector<int> parent(document.nodes.size(), -1), out;
+  for (std::size_t n = 0; n < document.nodes.size(); ++n) {
+    for (const int child : document.nodes[n].children) {
+      const bool good = child >= 0 && static_cast<std::size_t>(child) < document.nodes.size() &&
                         parent[static_cast<std::size_t>(child)] < 0;
       if (!good) accessors.fail(fmt::format("node {} has child {}", n, child), "a node of the file with one parent");
       parent[static_cast<std::size_t>(child)] = static_cast<int>(n);
@@ -207,7 +193,7 @@ std::vector<int> gltf_order(const tinygltf::Model& model, const GltfAccessors& a
     if (parent[n] < 0) out.push_back(static_cast<int>(n));
   }
   for (std::size_t i = 0; i < out.size(); ++i) {
-    const auto& children = model.nodes[static_cast<std::size_t>(out[i])].children;
+    const auto& children = document.nodes[static_cast<std::size_t>(out[i])].children;
     out.insert(out.end(), children.begin(), children.end());
   }
   if (out.size() != parent.size()) accessors.fail("nodes that are their own ancestors", "a tree");

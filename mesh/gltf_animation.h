@@ -5,16 +5,15 @@
 #include <optional>
 #include <vector>
 
+#include "gltf/accessors.h"
 #include <Eigen/Core>
-
-#include "mesh/gltf_accessors.h"
 
 namespace kinespace {
 
 // One sampler with what it drives.
 struct GltfChannel {
-  enum class Path : std::uint8_t { translation, rotation, scale, weights };
-  enum class Interpolation : std::uint8_t { step, linear, cubic };
+  using Path = gltf::Animation::Path;
+  using Interpolation = gltf::Animation::Interpolation;
   int node = -1;
   Path path = Path::translation;
   Interpolation interpolation = Interpolation::linear;
@@ -29,7 +28,7 @@ struct GltfChannel {
 class GltfAnimation {
  public:
   // The first animation of the file; empty when it has none.
-  GltfAnimation(const tinygltf::Model& model, const GltfAccessors& accessors);
+  GltfAnimation(const gltf::Document& document, const gltf::Accessors& accessors);
 
   [[nodiscard]] const std::vector<GltfChannel>& channels() const { return channels_; }
   // When to look: at the times that all channels share when these are evenly spaced and no rate is wanted, else from
@@ -38,7 +37,7 @@ class GltfAnimation {
     std::vector<double> at;
     double rate_hz;
   };
-  [[nodiscard]] Times times(std::optional<double> rate_hz, const GltfAccessors& accessors) const;
+  [[nodiscard]] Times times(std::optional<double> rate_hz, const gltf::Accessors& accessors) const;
 
  private:
   std::vector<GltfChannel> channels_;
@@ -49,9 +48,9 @@ struct GltfPose {
   std::vector<Eigen::Matrix4d> local;
   std::vector<std::vector<double>> weights;
 };
-[[nodiscard]] GltfPose gltf_pose(const tinygltf::Model& model, const GltfAnimation& animation, double time);
+[[nodiscard]] GltfPose gltf_pose(const gltf::Document& document, const GltfAnimation& animation, double time);
 
 // Every node once, parents first. Throws Error{bad_input} for a node that is its own ancestor or has two parents.
-[[nodiscard]] std::vector<int> gltf_order(const tinygltf::Model& model, const GltfAccessors& accessors);
+[[nodiscard]] std::vector<int> gltf_order(const gltf::Document& document, const gltf::Accessors& accessors);
 
 }  // namespace kinespace

@@ -2,12 +2,12 @@
 #include <cmath>
 #include <limits>
 
+#include "gltf/accessors.h"
+#include "gltf/document.h"
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <tiny_gltf.h>
 
 #include "base/error.h"
-#include "mesh/gltf_accessors.h"
 #include "mesh/gltf_animation.h"
 #include "mesh/mesh_formats.h"
 
@@ -26,59 +26,66 @@ struct Part {
   [[nodiscard]] std::size_t vertices() const { return positions.size() / 3; }
 };
 
+// How many vertices are moved between two looks at whether to stop: some milliseconds.
+constexpr std::size_t stop_stride = 65536;
+
 class Baker {
  public:
-  Baker(const tinygltf::Model& model, const std::string& file)
-      : model_(model), accessors_(model, file), order_(gltf_order(model, accessors_)), animation_(model, accessors_) {
+  Baker(const gltf::Document& document, const std::string& file, gltf::Budget& budget, const Progress& progress)
+      : document_(document),
+        accessors_(document, file, budget),
+        budget_(budget),
+        progress_(progress),
+        order_(gltf_order(document, accessors_)),
+        animation_(document, accessors_) {
     find_parts();
-    for (const tinygltf::Skin& skin : model_.skins) inverse_binds_.push_back(inverse_binds_of(skin));
+    for (const gltf::Skin& skin : document_.skins) inverse_binds_.push_back(inverse_binds_of(skin));
   }
 
   MeshSequence bake(std::optional<double> rate_hz) {
     const GltfAnimation::Times times = animation_.times(rate_hz, accessors_);
     out_.rate_hz = times.rate_hz;
     out_.frames = static_cast<int>(times.at.size());
-    constexpr double most_bytes = 16e9;
-    if (static_cast<double>(out_.frame_size()) * 4 * out_.frames > most_bytes) {
-      accessors_.fail(fmt::format("{} frames of {} vertices", out_.frames, out_.vertices), "at most 16 GB of positions",
-                      "give a lower rate");
-    }
+    budget_.take(fmt::format("{} frames of {} vertices", out_.frames, out_.vertices), times.at.size(),
+                 out_.frame_size() * sizeof(float));
     out_.positions.reserve(out_.frame_size() * times.at.size());
-    for (const double time : times.at) add_frame(time);
+    for (const double time : times.at) {
+      progress_.at("baking", static_cast<double>(out_.positions.size()) /
+                                 static_cast<double>(out_.frame_size() * times.at.size()));
+      add_frame(time);
+    }
     return std::move(out_);
   }
 
  private:
   void find_parts() {
     for (const int n : order_) {
-      const tinygltf::Node& node = model_.nodes[static_cast<std::size_t>(n)];
+      const gltf::Node& node = document_.nodes[static_cast<std::size_t>(n)];
       if (node.mesh < 0) continue;
-      if (static_cast<std::size_t>(node.mesh) >= model_.meshes.size()) {
-        accessors_.fail(fmt::format("mesh {}", node.mesh), fmt::format("fewer than {}", model_.meshes.size()));
+      if (static_cast<std::size_t>(node.mesh) >= document_.meshes.size()) {
+        accessors_.fail(fmt::format("mesh {}", node.mesh), fmt::format("fewer than {}", document_.meshes.size()));
       }
-      if (node.skin >= 0 && static_cast<std::size_t>(node.skin) >= model_.skins.size()) {
-        accessors_.fail(fmt::format("skin {}", node.skin), fmt::format("fewer than {}", model_.skins.size()));
+      if (node.skin >= 0 && static_cast<std::size_t>(node.skin) >= document_.skins.size()) {
+        accessors_.fail(fmt::format("skin {}", node.skin), fmt::format("fewer than {}", document_.skins.size()));
       }
-      for (const tinygltf::Primitive& primitive : model_.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
-        const bool surface = primitive.mode < 0 || (primitive.mode >= TINYGLTF_MODE_TRIANGLES &&
-                                                    primitive.mode <= TINYGLTF_MODE_TRIANGLE_FAN);
-        if (surface) add_part(n, node, primitive);
+      for (const gltf::Primitive& primitive : document_.meshes[static_cast<std::size_t>(node.mesh)].primitives) {
+        if (primitive.mode >= gltf::mode_triangles && primitive.mode <= gltf::mode_fan) add_part(n, node, primitive);
       }
     }
     if (parts_.empty()) accessors_.fail("no triangles", "a mesh");
   }
 
-  void add_part(int n, const tinygltf::Node& node, const tinygltf::Primitive& primitive) {
-    if (primitive.extensions.contains("KHR_draco_mesh_compression")) {
-      accessors_.fail("a mesh compressed by Draco", "plain accessors", "save it without compression");
-    }
+  void add_part(int n, const gltf::Node& node, const gltf::Primitive& primitive) {
+    progress_.check_stop();
+    // With the joints' matrices, which are made anew for every part and frame.
+    budget_.take("parts", 1, sizeof(Part) + joints_of(node) * sizeof(Eigen::Matrix4d));
+    budget_.take("morph targets", primitive.targets.size(), sizeof(std::vector<float>));
     Part part{.node = n, .skin = node.skin, .mesh = node.mesh};
     part.positions = accessors_.floats(attribute(primitive, "POSITION"), 3);
-    for (const auto& target : primitive.targets) {
-      const auto found = target.find("POSITION");
-      part.targets.push_back(found == target.end() ? std::vector<float>(part.positions.size())
-                                                   : accessors_.floats(found->second, 3));
-      require_count(part.targets.back().size(), part.positions.size());
+    for (const int target : primitive.targets) {
+      // A target that leaves the positions alone stays empty.
+      part.targets.push_back(target < 0 ? std::vector<float>() : accessors_.floats(target, 3));
+      if (target >= 0) require_count(part.targets.back().size(), part.positions.size());
     }
     if (part.skin >= 0) add_bones(primitive, part);
     add_triangles(primitive, part.vertices());
@@ -89,7 +96,11 @@ class Baker {
     parts_.push_back(std::move(part));
   }
 
-  int attribute(const tinygltf::Primitive& primitive, const std::string& name) const {
+  std::size_t joints_of(const gltf::Node& node) const {
+    return node.skin < 0 ? 0 : document_.skins[static_cast<std::size_t>(node.skin)].joints.size();
+  }
+
+  int attribute(const gltf::Primitive& primitive, const std::string& name) const {
     const auto found = primitive.attributes.find(name);
     if (found == primitive.attributes.end()) accessors_.fail("a mesh without " + name, "this attribute");
     return found->second;
@@ -100,13 +111,13 @@ class Baker {
       accessors_.fail(fmt::format("an attribute of {} numbers", found), fmt::format("{}", expected));
   }
 
-  void add_bones(const tinygltf::Primitive& primitive, Part& part) const {
+  void add_bones(const gltf::Primitive& primitive, Part& part) const {
     for (int set = 0; primitive.attributes.contains(fmt::format("JOINTS_{}", set)); ++set) {
       auto joints = accessors_.indices(attribute(primitive, fmt::format("JOINTS_{}", set)), 4);
       auto weights = accessors_.floats(attribute(primitive, fmt::format("WEIGHTS_{}", set)), 4);
       require_count(joints.size(), part.vertices() * 4);
       require_count(weights.size(), part.vertices() * 4);
-      const auto& bones = model_.skins[static_cast<std::size_t>(part.skin)].joints;
+      const auto& bones = document_.skins[static_cast<std::size_t>(part.skin)].joints;
       for (std::size_t i = 0; i < joints.size(); ++i) {
         if (joints[i] >= bones.size() && weights[i] != 0) {
           accessors_.fail(fmt::format("a vertex on joint {}", joints[i]), fmt::format("fewer than {}", bones.size()));
@@ -116,11 +127,12 @@ class Baker {
     }
   }
 
-  void add_triangles(const tinygltf::Primitive& primitive, std::size_t vertices) {
+  void add_triangles(const gltf::Primitive& primitive, std::size_t vertices) {
     std::vector<std::uint32_t> corners;
     if (primitive.indices >= 0) {
       corners = accessors_.indices(primitive.indices, 1);
     } else {
+      budget_.take("triangles", vertices, sizeof(std::uint32_t));
       for (std::size_t v = 0; v < vertices; ++v) corners.push_back(static_cast<std::uint32_t>(v));
     }
     for (const std::uint32_t v : corners) {
@@ -131,9 +143,9 @@ class Baker {
       const auto vertex = [&](std::size_t i) { return out_.vertices + static_cast<std::int32_t>(corners[i]); };
       out_.triangles.push_back({vertex(a), vertex(b), vertex(c)});
     };
-    const bool strip = primitive.mode == TINYGLTF_MODE_TRIANGLE_STRIP,
-               fan = primitive.mode == TINYGLTF_MODE_TRIANGLE_FAN;
+    const bool strip = primitive.mode == gltf::mode_strip, fan = primitive.mode == gltf::mode_fan;
     const std::size_t step = strip || fan ? 1 : 3;
+    budget_.take("triangles", corners.size() / step, sizeof(Triangle));
     for (std::size_t i = 0; i + 2 < corners.size(); i += step) {
       if (fan) {
         add(i + 1, i + 2, 0);
@@ -145,15 +157,16 @@ class Baker {
     }
   }
 
-  std::vector<Eigen::Matrix4d> inverse_binds_of(const tinygltf::Skin& skin) const {
+  std::vector<Eigen::Matrix4d> inverse_binds_of(const gltf::Skin& skin) const {
+    budget_.take("a skin's matrices", skin.joints.size(), sizeof(Eigen::Matrix4d));
     std::vector<Eigen::Matrix4d> out(skin.joints.size(), Eigen::Matrix4d::Identity());
     for (const int joint : skin.joints) {
-      if (joint < 0 || static_cast<std::size_t>(joint) >= model_.nodes.size()) {
+      if (joint < 0 || static_cast<std::size_t>(joint) >= document_.nodes.size()) {
         accessors_.fail(fmt::format("a skin with joint {}", joint), "a node of the file");
       }
     }
-    if (skin.inverseBindMatrices < 0) return out;
-    const std::vector<float> numbers = accessors_.floats(skin.inverseBindMatrices, 16);
+    if (skin.inverse_binds < 0) return out;
+    const std::vector<float> numbers = accessors_.floats(skin.inverse_binds, 16);
     if (numbers.size() < out.size() * 16) accessors_.fail("a skin with fewer matrices than joints", "one for each");
     for (std::size_t j = 0; j < out.size(); ++j) {
       out[j] = Eigen::Map<const Eigen::Matrix4f>(numbers.data() + 16 * j).cast<double>();
@@ -162,10 +175,10 @@ class Baker {
   }
 
   void add_frame(double time) {
-    GltfPose pose = gltf_pose(model_, animation_, time);
+    GltfPose pose = gltf_pose(document_, animation_, time);
     // Parents come first in the order, so every node meets its parent's finished matrix.
     for (const int n : order_) {
-      for (const int child : model_.nodes[static_cast<std::size_t>(n)].children) {
+      for (const int child : document_.nodes[static_cast<std::size_t>(n)].children) {
         auto& local = pose.local[static_cast<std::size_t>(child)];
         local = pose.local[static_cast<std::size_t>(n)] * local;
       }
@@ -176,9 +189,10 @@ class Baker {
   void add_part_positions(const Part& part, const GltfPose& pose) {
     std::vector<float> moved = part.positions;
     const auto& own = pose.weights[static_cast<std::size_t>(part.node)];
-    const auto& weights = own.empty() ? model_.meshes[static_cast<std::size_t>(part.mesh)].weights : own;
+    const auto& weights = own.empty() ? document_.meshes[static_cast<std::size_t>(part.mesh)].weights : own;
     for (std::size_t t = 0; t < std::min(part.targets.size(), weights.size()); ++t) {
-      if (weights[t] == 0) continue;
+      if (weights[t] == 0 || part.targets[t].empty()) continue;
+      progress_.check_stop();
       for (std::size_t i = 0; i < moved.size(); ++i) {
         moved[i] =
             static_cast<float>(static_cast<double>(moved[i]) + weights[t] * static_cast<double>(part.targets[t][i]));
@@ -186,7 +200,7 @@ class Baker {
     }
     std::vector<Eigen::Matrix4d> bones;
     if (part.skin >= 0) {
-      const auto& joints = model_.skins[static_cast<std::size_t>(part.skin)].joints;
+      const auto& joints = document_.skins[static_cast<std::size_t>(part.skin)].joints;
       for (std::size_t j = 0; j < joints.size(); ++j) {
         bones.push_back(pose.local[static_cast<std::size_t>(joints[j])] *
                         inverse_binds_[static_cast<std::size_t>(part.skin)][j]);
@@ -195,6 +209,7 @@ class Baker {
     const Eigen::Matrix4d& still = pose.local[static_cast<std::size_t>(part.node)];
     const bool moves = !still.isIdentity(0);
     for (std::size_t v = 0; v < part.vertices(); ++v) {
+      if (v % stop_stride == 0) progress_.check_stop();
       if (part.bones.empty() && !moves) {
         out_.positions.insert(out_.positions.end(), &moved[3 * v], &moved[3 * v] + 3);
         continue;
@@ -222,8 +237,10 @@ class Baker {
     return total > 0 ? Eigen::Vector4d(sum / total) : p;
   }
 
-  const tinygltf::Model& model_;
-  GltfAccessors accessors_;
+  const gltf::Document& document_;
+  gltf::Accessors accessors_;
+  gltf::Budget& budget_;
+  const Progress& progress_;
   std::vector<int> order_;
   GltfAnimation animation_;
   std::vector<Part> parts_;
@@ -231,32 +248,15 @@ class Baker {
   MeshSequence out_;
 };
 
-bool no_image(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
-  return true;  // pictures are none of our business
-}
-
 }  // namespace
 
-MeshSequence parse_gltf_mesh(std::string_view bytes, const std::filesystem::path& file, std::optional<double> rate_hz) {
-  const auto fail = [&](std::string found, std::string expected) {
-    throw Error(ErrorKind::bad_input,
-                {.file = file.string(), .found = std::move(found), .expected = std::move(expected)});
-  };
-  if (bytes.size() > std::numeric_limits<std::uint32_t>::max()) fail("a file above 4 GB", "a smaller one");
-  tinygltf::TinyGLTF loader;
-  loader.SetImageLoader(no_image, nullptr);
-  tinygltf::Model model;
-  std::string error, warning;
-  const auto size = static_cast<unsigned>(bytes.size());
-  const std::string folder = file.parent_path().string();
-  const bool binary = bytes.substr(0, 4) == "glTF";
-  const bool loaded =
-      binary ? loader.LoadBinaryFromMemory(&model, &error, &warning,
-                                           reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
-             : loader.LoadASCIIFromString(&model, &error, &warning, bytes.data(), size, folder);
-  if (!loaded) fail("what glTF's reader refuses: " + error, "a glTF 2.0 file");
-  MeshSequence out = Baker(model, file.string()).bake(rate_hz);
-  require_valid(out, file.string());
+MeshSequence parse_gltf_mesh(std::string_view bytes, const std::filesystem::path& file,
+                             const MeshReadOptions& options) {
+  const std::string name = file.string();
+  gltf::Budget budget(name, bytes.size(), options.most_bytes);
+  const gltf::Document document = gltf::read_document(bytes, file, budget, options.progress);
+  MeshSequence out = Baker(document, name, budget, options.progress).bake(options.rate_hz);
+  require_valid(out, name);
   return out;
 }
 

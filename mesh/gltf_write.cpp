@@ -2,12 +2,12 @@
 #include <cstring>
 #include <sstream>
 
+#include "gltf/arrays.h"
+#include "gltf/tiny.h"
 #include <fmt/format.h>
-#include <tiny_gltf.h>
 
 #include "base/error.h"
 #include "mesh/mesh_formats.h"
-#include "motion/gltf_arrays.h"
 
 namespace kinespace {
 namespace {

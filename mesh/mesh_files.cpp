@@ -70,7 +70,7 @@ std::vector<fs::path> files_in(const fs::path& folder, const char* ending) {
   return out;
 }
 
-using ParseFrame = MeshFrame (*)(std::string_view, const std::string&);
+using ParseFrame = MeshFrame (*)(std::string_view, const std::string&, const Progress&);
 
 void require_same(const MeshSequence& mesh, const MeshFrame& frame, const fs::path& file, std::size_t number) {
   const auto refuse = [&](const std::string& what, std::size_t found, std::size_t expected) {
@@ -93,14 +93,16 @@ void require_same(const MeshSequence& mesh, const MeshFrame& frame, const fs::pa
        "every frame must have the triangles of the first, in the same order");
 }
 
-MeshSequence read_frames(const std::vector<fs::path>& files, ParseFrame parse) {
+MeshSequence read_frames(const std::vector<fs::path>& files, ParseFrame parse, const Progress& progress) {
   MeshSequence out;
   std::uintmax_t bytes = 0;
   std::error_code ignored;
   for (const fs::path& file : files) bytes += fs::file_size(file, ignored);
   for (std::size_t f = 0; f < files.size(); ++f) {
-    const FileContent mapped(files[f]);
-    MeshFrame frame = parse(mapped.text(), files[f].string());
+    progress.check_stop();
+    progress.at("reading", static_cast<double>(f) / static_cast<double>(files.size()));
+    const FileContent content(files[f]);
+    MeshFrame frame = parse(content.text(), files[f].string(), progress);
     if (f == 0) {
       out.vertices = static_cast<int>(frame.positions.size() / 3);
       out.triangles = std::move(frame.triangles);
@@ -116,7 +118,7 @@ MeshSequence read_frames(const std::vector<fs::path>& files, ParseFrame parse) {
   return out;
 }
 
-MeshSequence read_folder(const fs::path& path) {
+MeshSequence read_folder(const fs::path& path, const Progress& progress) {
   if (fs::exists(path / positions_name)) return read_numpy_mesh(path / positions_name, path / triangles_name);
   const std::vector<fs::path> obj = files_in(path, ".obj"), ply = files_in(path, ".ply");
   if (obj.empty() && ply.empty()) {
@@ -126,18 +128,18 @@ MeshSequence read_folder(const fs::path& path) {
   if (!obj.empty() && !ply.empty()) {
     fail(ErrorKind::bad_input, path, "a folder with .obj and .ply files", "one kind", "put them into two folders");
   }
-  return obj.empty() ? read_frames(ply, parse_ply) : read_frames(obj, parse_obj);
+  return obj.empty() ? read_frames(ply, parse_ply, progress) : read_frames(obj, parse_obj, progress);
 }
 
-MeshSequence read_any(const fs::path& path, std::optional<double> rate_hz) {
+MeshSequence read_any(const fs::path& path, const MeshReadOptions& options) {
   std::error_code ignored;
-  if (fs::is_directory(path, ignored)) return read_folder(path);
+  if (fs::is_directory(path, ignored)) return read_folder(path, options.progress);
   if (has_ending(path, ".npy")) return read_numpy_mesh(path, path.parent_path() / triangles_name);
-  if (has_ending(path, ".obj")) return read_frames({path}, parse_obj);
-  if (has_ending(path, ".ply")) return read_frames({path}, parse_ply);
+  if (has_ending(path, ".obj")) return read_frames({path}, parse_obj, options.progress);
+  if (has_ending(path, ".ply")) return read_frames({path}, parse_ply, options.progress);
   if (has_ending(path, ".gltf") || has_ending(path, ".glb")) {
     const FileContent file(path);
-    return parse_gltf_mesh(file.text(), path, rate_hz);
+    return parse_gltf_mesh(file.text(), path, options);
   }
   if (!fs::exists(path, ignored)) fail(ErrorKind::bad_input, path, "no such file or folder", "a mesh sequence");
   fail(ErrorKind::bad_input, path, "another kind of file", "a folder, .npy, .obj, .ply, .gltf or .glb");
@@ -174,7 +176,7 @@ class FolderInTheMaking {
   bool done_ = false;
 };
 
-void fill_folder(const fs::path& folder, const MeshSequence& mesh, MeshFormat format) {
+void fill_folder(const fs::path& folder, const MeshSequence& mesh, MeshFormat format, const Progress& progress) {
   if (format == MeshFormat::numpy) {
     const std::string triangles = format_numpy_triangles(mesh.triangles), positions = format_numpy_positions(mesh);
     const std::array files = {FileToWrite{folder / triangles_name, triangles},
@@ -184,6 +186,7 @@ void fill_folder(const fs::path& folder, const MeshSequence& mesh, MeshFormat fo
   }
   const bool obj = format == MeshFormat::obj;
   for (int f = 0; f < mesh.frames; ++f) {
+    progress.check_stop();
     write_file_atomically(folder / fmt::format("frame_{:05}.{}", f + 1, obj ? "obj" : "ply"),
                           obj ? format_obj(mesh.frame(f), mesh.triangles) : format_ply(mesh.frame(f), mesh.triangles));
   }
@@ -211,20 +214,25 @@ MeshSequence read_numpy_mesh(const fs::path& positions, const fs::path& triangle
   return out;
 }
 
-MeshSequence read_mesh_sequence(const fs::path& path, std::optional<double> rate_hz) {
+void MeshReadOptions::validate() const {
   if (rate_hz && !(*rate_hz > 0 && *rate_hz <= 1e6)) {
-    fail(ErrorKind::usage, {}, fmt::format("rate_hz = {}", *rate_hz), "above 0 and at most 1e6");
+    fail(ErrorKind::usage, {}, fmt::format("a rate of {} frames a second", *rate_hz), "above 0 and at most 1e6");
   }
-  MeshSequence out = read_any(path, rate_hz);
+  if (most_bytes && *most_bytes == 0) fail(ErrorKind::usage, {}, "a memory limit of 0", "more than 0");
+}
+
+MeshSequence read_mesh_sequence(const fs::path& path, const MeshReadOptions& options) {
+  options.validate();
+  MeshSequence out = read_any(path, options);
   const bool tells_rate = has_ending(path, ".gltf") || has_ending(path, ".glb");
-  if (rate_hz && !tells_rate) out.rate_hz = *rate_hz;
+  if (options.rate_hz && !tells_rate) out.rate_hz = *options.rate_hz;
   fs::path named = path.filename().empty() ? path.parent_path() : path;
   out.name = named.stem().string();
   require_valid(out, path.string());
   return out;
 }
 
-void write_mesh_sequence(const fs::path& path, const MeshSequence& mesh, MeshFormat format) {
+void write_mesh_sequence(const fs::path& path, const MeshSequence& mesh, MeshFormat format, const Progress& progress) {
   require_valid(mesh, mesh.name);
   if (format == MeshFormat::gltf) {
     write_file_atomically(path, format_gltf_mesh(mesh, has_ending(path, ".glb")));
@@ -239,11 +247,11 @@ void write_mesh_sequence(const fs::path& path, const MeshSequence& mesh, MeshFor
       fail(ErrorKind::usage, path, "a folder that is not empty", "a new or an empty folder",
            "give another output name");
     }
-    fill_folder(path, mesh, format);
+    fill_folder(path, mesh, format, progress);
     return;
   }
   FolderInTheMaking folder(path);
-  fill_folder(folder.path(), mesh, format);
+  fill_folder(folder.path(), mesh, format, progress);
   folder.finish();
 }
 

@@ -9,10 +9,10 @@
 //          `f` are read, polygons are cut into fans; the rest is ignored.
 //   PLY    the same, binary of either byte order: vertices with x, y, z; faces with vertex_indices or vertex_index.
 //   glTF   .gltf or .glb, baked: nodes, skins and morph targets of the first animation (or the rest pose, one frame)
-//   for
-//          every node with triangles in the scene, at `rate_hz`; where all samplers share evenly spaced times, at
-//          those. Written as one mesh with a morph target a frame. Buffers in the file or beside it; no Draco, no
-//          sparse accessors without a base that does not fit.
+//          for every node with triangles in the file, at `rate_hz`; where all samplers share evenly spaced times, at
+//          those. Written as one mesh with a morph target a frame. Buffers in the file or in files of its folder
+//          (gltf/buffers.h); pictures are not looked at. Not read: files that require Draco, meshopt or another
+//          extension that changes shapes.
 //
 // The rate of what does not tell one is MeshSequence::usual_rate_hz. Every frame must have the vertices and triangles
 // of the first, in the same order: another count or order is an Error{bad_input} that names file and frame. Sizes are
@@ -23,6 +23,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "base/progress.h"
 #include "mesh/mesh_sequence.h"
 
 namespace kinespace {
@@ -34,8 +35,20 @@ enum class MeshFormat : std::uint8_t {
   gltf,   // a file: .glb, else text
 };
 
-// Throws Error{bad_input}. `rate_hz`: for files without a rate, and of the baking of a glTF animation without one.
-[[nodiscard]] MeshSequence read_mesh_sequence(const std::filesystem::path& path, std::optional<double> rate_hz = {});
+struct MeshReadOptions {
+  // Frames a second, above 0 and at most 1e6: of files without a rate, and of the baking of a glTF animation.
+  std::optional<double> rate_hz;
+  // Bytes that may be made from one glTF file, all together. By default 64 times the file and 256 MiB, so that a small
+  // file cannot fill the memory; long animations of large skinned meshes need more.
+  std::optional<std::uint64_t> most_bytes;
+  Progress progress;
+
+  // Throws Error{usage} naming field, value and legal range.
+  void validate() const;
+};
+
+// Throws Error{bad_input}; Interrupted when options.progress says so.
+[[nodiscard]] MeshSequence read_mesh_sequence(const std::filesystem::path& path, const MeshReadOptions& options = {});
 [[nodiscard]] MeshSequence read_numpy_mesh(const std::filesystem::path& positions,
                                            const std::filesystem::path& triangles, std::optional<double> rate_hz = {});
 
@@ -44,7 +57,7 @@ enum class MeshFormat : std::uint8_t {
 // usage when the folder holds something else, bad_input when the mesh is not valid or a glTF file of it would be above
 // 2 GB.
 void write_mesh_sequence(const std::filesystem::path& path, const MeshSequence& mesh,
-                         MeshFormat format = MeshFormat::numpy);
+                         MeshFormat format = MeshFormat::numpy, const Progress& progress = {});
 
 // True for what read_mesh_sequence would try: a folder, .npy, .obj, .ply, .gltf, .glb.
 [[nodiscard]] bool may_be_mesh_sequence(const std::filesystem::path& path);

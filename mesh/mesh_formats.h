@@ -2,12 +2,12 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "mesh/mesh_files.h"
 #include "mesh/mesh_sequence.h"
 
 namespace kinespace {
@@ -18,12 +18,12 @@ struct MeshFrame {
 };
 
 // Throw Error{bad_input} naming `name` and, for text, the line. Indices are checked, coordinates finite.
-[[nodiscard]] MeshFrame parse_obj(std::string_view text, const std::string& name);
-[[nodiscard]] MeshFrame parse_ply(std::string_view bytes, const std::string& name);
+[[nodiscard]] MeshFrame parse_obj(std::string_view text, const std::string& name, const Progress& progress = {});
+[[nodiscard]] MeshFrame parse_ply(std::string_view bytes, const std::string& name, const Progress& progress = {});
 [[nodiscard]] MeshSequence parse_numpy(std::string_view positions, const std::string& positions_name,
                                        std::string_view triangles, const std::string& triangles_name);
 [[nodiscard]] MeshSequence parse_gltf_mesh(std::string_view bytes, const std::filesystem::path& file,
-                                           std::optional<double> rate_hz);
+                                           const MeshReadOptions& options = {});
 
 [[nodiscard]] std::string format_obj(std::span<const float> positions, std::span<const Triangle> triangles);
 [[nodiscard]] std::string format_ply(std::span<const float> positions, std::span<const Triangle> triangles);

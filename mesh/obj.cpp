@@ -11,10 +11,12 @@ namespace {
 
 class ObjReader {
  public:
-  ObjReader(std::string_view text, const std::string& name) : source_(text, name), at_(source_.begin()) {}
+  ObjReader(std::string_view text, const std::string& name, const Progress& progress)
+      : source_(text, name), progress_(progress), at_(source_.begin()) {}
 
   MeshFrame read() {
-    while (at_ != source_.end()) {
+    for (std::size_t line = 0; at_ != source_.end(); ++line) {
+      if (line % 65536 == 0) progress_.check_stop();
       skip_blanks();
       const std::string_view word = word_at(at_, source_.end());
       if (word == "v") {
@@ -92,6 +94,7 @@ class ObjReader {
   }
 
   TextSource source_;
+  const Progress& progress_;
   const char* at_;
   MeshFrame out_;
   std::int64_t highest_ = 0;
@@ -100,8 +103,8 @@ class ObjReader {
 
 }  // namespace
 
-MeshFrame parse_obj(std::string_view text, const std::string& name) {
-  return ObjReader(text, name).read();
+MeshFrame parse_obj(std::string_view text, const std::string& name, const Progress& progress) {
+  return ObjReader(text, name, progress).read();
 }
 
 std::string format_obj(std::span<const float> positions, std::span<const Triangle> triangles) {

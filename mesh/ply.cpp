@@ -47,7 +47,8 @@ std::size_t size_of(Type type) {
 
 class PlyReader {
  public:
-  PlyReader(std::string_view bytes, const std::string& name) : name_(name), left_(bytes) {}
+  PlyReader(std::string_view bytes, const std::string& name, const Progress& progress)
+      : name_(name), progress_(progress), left_(bytes) {}
 
   MeshFrame read() {
     read_header();
@@ -220,6 +221,7 @@ class PlyReader {
     if (place[0] < 0 || place[1] < 0 || place[2] < 0) fail("vertices without x, y and z", "these three properties");
     out_.positions.resize(static_cast<std::size_t>(element.count) * 3);
     for (std::size_t v = 0; v < static_cast<std::size_t>(element.count); ++v) {
+      if (v % 65536 == 0) progress_.check_stop();
       for (std::size_t p = 0; p < element.properties.size(); ++p) {
         const auto c = static_cast<std::size_t>(std::find(place, place + 3, static_cast<int>(p)) - place);
         if (c == 3) {
@@ -237,6 +239,7 @@ class PlyReader {
   void read_faces(const Element& element) {
     if (!out_.triangles.empty()) fail("a second element face", "one");
     for (std::int64_t f = 0; f < element.count; ++f) {
+      if (f % 65536 == 0) progress_.check_stop();
       for (const Property& property : element.properties) {
         const bool corners = property.list && (property.name == "vertex_indices" || property.name == "vertex_index");
         corners ? read_polygon(property) : skip(property);
@@ -262,6 +265,7 @@ class PlyReader {
   }
 
   std::string name_;
+  const Progress& progress_;
   std::string_view left_;
   std::int64_t line_ = 0;
   bool swap_ = false;
@@ -271,8 +275,8 @@ class PlyReader {
 
 }  // namespace
 
-MeshFrame parse_ply(std::string_view bytes, const std::string& name) {
-  return PlyReader(bytes, name).read();
+MeshFrame parse_ply(std::string_view bytes, const std::string& name, const Progress& progress) {
+  return PlyReader(bytes, name, progress).read();
 }
 
 std::string format_ply(std::span<const float> positions, std::span<const Triangle> triangles) {

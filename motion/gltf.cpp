@@ -10,11 +10,11 @@
 #include <utility>
 #include <vector>
 
-#include <tiny_gltf.h>
+#include "gltf/arrays.h"
+#include "gltf/tiny.h"
 
 #include "base/error.h"
 #include "base/file.h"
-#include "motion/gltf_arrays.h"
 #include "motion/text.h"
 
 namespace kinespace {

@@ -13,19 +13,19 @@ import tempfile
 # The arrows: what each folder may include beside itself. A new folder gets a line here.
 ARROWS = {
     "base": "",
-    "cmake": "",
-    "motion": "base",
+    "gltf": "base",
+    "motion": "base gltf",
     "storage": "base",
     "kernels": "base",
     "fpca": "base motion storage kernels",
     "footskate": "base motion storage",
     "synthesis": "base motion storage kernels fpca",
-    "mesh": "base motion storage",
+    "mesh": "base gltf motion storage",
     "codecs": "base motion storage kernels fpca mesh",
     "examples": "base motion storage kernels fpca footskate synthesis mesh codecs",
     "bench": "base motion storage kernels fpca footskate synthesis mesh codecs examples",
     "cli": "base motion storage kernels fpca footskate synthesis mesh codecs bench",
-    "tests": "base motion storage kernels fpca footskate synthesis mesh codecs examples bench cli",
+    "tests": "base gltf motion storage kernels fpca footskate synthesis mesh codecs examples bench cli",
 }
 ARROWS = {folder: set(others.split()) | {folder} for folder, others in ARROWS.items()}
 

@@ -118,6 +118,7 @@ HarmonicsAnalysis::Attempt HarmonicsAnalysis::code(double step, bool exact, Harm
     } else {
       detail = block.detail->code(options);
     }
+    out.numbers += 3 * std::int64_t{space_->vertices()} * (motion.part.functions.cols() + detail.part.functions.cols());
     out.squared_error += motion.squared_error + detail.squared_error;
     out.bytes += static_cast<std::int64_t>(motion.bytes.size() + detail.bytes.size());
     out.motion.push_back(std::move(motion.bytes));
@@ -171,7 +172,8 @@ Bytes HarmonicsAnalysis::stream_of(const Attempt& attempt, const MeshError& erro
     out.add_section(fmt::format("m{}", b), attempt.motion[b]);
     out.add_section(fmt::format("d{}", b), attempt.detail[b]);
   }
-  return finish_mesh_stream(std::move(out), setup.layout);
+  const std::int64_t basis = std::int64_t{space_->functions()} * space_->vertices();
+  return finish_mesh_stream(std::move(out), setup.layout, std::max(basis, attempt.numbers));
 }
 
 }  // namespace kinespace

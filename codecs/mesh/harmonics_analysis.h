@@ -35,6 +35,7 @@ class HarmonicsAnalysis {
   struct Attempt {
     double squared_error = 0;           // of the vertices that are coded, before rounding to floats
     std::int64_t bytes = 0;             // of coefficients and residuals
+    std::int64_t numbers = 0;           // that a reader makes of them
     std::vector<Bytes> motion, detail;  // by block
     double step = 0;
   };

@@ -13,6 +13,9 @@ namespace kinespace {
 namespace {
 
 constexpr std::int64_t most_coordinate = std::int64_t{1} << 30;
+// Draco walks around a vertex once for each triangle there: beyond so many steps in all (a fan of 23 000 triangles) it
+// takes longer than its bytes are worth.
+constexpr std::int64_t most_draco_steps = std::int64_t{1} << 29;
 constexpr int count_context = 8, lost_context = 9, split_context = 10, triangle_context = 11, position_context = 12;
 
 // How Draco's points become vertices.
@@ -167,6 +170,20 @@ bool agrees(const Surface& plain, std::span<const std::int32_t> vertex_of, const
   return true;
 }
 
+// At least: what is beyond the limit is not counted on.
+std::int64_t draco_steps(const KeyMesh& mesh) {
+  std::vector<std::int64_t> around(static_cast<std::size_t>(mesh.vertices));
+  for (const Triangle& t : mesh.triangles) {
+    for (const std::int32_t v : t) ++around[static_cast<std::size_t>(v)];
+  }
+  std::int64_t out = 0;
+  for (const std::int64_t n : around) {
+    out += n * n;
+    if (out > most_draco_steps) break;
+  }
+  return out;
+}
+
 // A label on every point tells which vertex it was; then the same mesh without the labels.
 std::optional<DracoPart> with_draco(const KeyMesh& mesh) {
   Surface surface{.points = mesh.vertices, .triangles = mesh.triangles, .keys = mesh.keys, .label = {}};
@@ -178,8 +195,13 @@ std::optional<DracoPart> with_draco(const KeyMesh& mesh) {
   if (!bytes || !labelled) return {};
   const auto faces = static_cast<std::int64_t>(mesh.triangles.size());
   const auto keys = static_cast<int>(mesh.keys.size());
-  Surface plain = draco_decode(*bytes, mesh.vertices * 4, faces, keys, false, "");
-  const Surface told = draco_decode(*labelled, mesh.vertices * 4, faces, keys, true, "");
+  Surface plain, told;
+  try {
+    plain = draco_decode(*bytes, mesh.vertices * 4, faces, keys, false, "");
+    told = draco_decode(*labelled, mesh.vertices * 4, faces, keys, true, "");
+  } catch (const Error&) {
+    return {};  // cut into more points than a reader takes, say
+  }
   auto vertex_of = labels_of(plain, told, mesh.vertices);
   if (!vertex_of || !agrees(plain, *vertex_of, mesh)) return {};
   DracoPart out{.bytes = std::move(*bytes), .triangles = std::move(plain.triangles), .map = {}, .missing = {}};
@@ -281,7 +303,8 @@ std::vector<std::int32_t> all_of(int vertices) {
 }  // namespace
 
 PackedKeyMesh pack_key_mesh(const KeyMesh& mesh) {
-  if (const auto part = with_draco(mesh)) {
+  const auto part = draco_steps(mesh) <= most_draco_steps ? with_draco(mesh) : std::nullopt;
+  if (part) {
     return {.surface = part->bytes, .order = put_draco_corrections(mesh, *part)};
   }
   IntegerWriter out;

@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "codecs/mesh/draco_frames.h"
 #include "codecs/mesh/harmonics_stream.h"
+#include "codecs/mesh/mesh_layout.h"
 #include "codecs/mesh/paper_harmonics.h"
 #include "codecs/mesh/trajectory_pca.h"
 
@@ -70,6 +71,7 @@ std::span<const std::string_view> mesh_codecs() {
 Bytes encode_mesh(std::string_view codec, const MeshSequence& mesh, const MeshCodecOptions& options) {
   require_valid(mesh, mesh.name);
   options.validate(mesh);
+  require_encodable(mesh);
   if (codec == names[0]) {
     return options.profile == MeshProfile::paper ? encode_paper_harmonics(mesh, options)
                                                  : encode_harmonics(mesh, options);

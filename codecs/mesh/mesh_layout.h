@@ -24,6 +24,8 @@ struct MeshLayout {
 };
 [[nodiscard]] MeshLayout layout_of(const MeshSequence& mesh);
 void put_layout(ByteWriter& out, const MeshLayout& layout);
+// Throws Error{bad_input} for what get_layout takes from no stream.
+void require_encodable(const MeshSequence& mesh);
 // Counts are checked against the stream's size: a vertex, triangle or frame costs memory. Throws Error{bad_input}.
 [[nodiscard]] MeshLayout get_layout(ByteReader& in, std::uint64_t stream_bytes);
 // A sequence of that layout without positions.
@@ -32,8 +34,9 @@ void put_layout(ByteWriter& out, const MeshLayout& layout);
 // How many numbers a stream of so many bytes may stand for in memory, in any one table.
 [[nodiscard]] std::int64_t most_mesh_numbers(std::uint64_t stream_bytes);
 
-// The finished stream; made longer with zeros where a reader would not believe so few bytes so many positions, or the
-// `numbers` of one of its tables.
+// The finished stream; made longer with zeros where a reader would not believe so few bytes so many vertices, triangles
+// and positions (get_layout), or the `numbers` of its tables (most_mesh_numbers). Throws Error{bad_input} for more
+// numbers than a reader takes, however long the stream.
 [[nodiscard]] Bytes finish_mesh_stream(BitstreamWriter out, const MeshLayout& layout, std::int64_t numbers = 0);
 
 // x = origin + step * q.

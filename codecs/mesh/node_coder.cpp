@@ -81,10 +81,10 @@ class Memory {
     const std::size_t near_class = class_of(near), before_class = class_of(before);
     out.at[0] = near_class * classes + class_of(own);
     out.at[1] = before_class * classes + class_of(lively / 6);
-    out.at[2] = class_of(near_lively_ / 6) * classes + class_of(lively / 6);
+    out.at[2] = class_of(static_cast<int>(near_lively_ / 6)) * classes + class_of(lively / 6);
     out.at[3] = static_cast<std::size_t>(graph_.band[static_cast<std::size_t>(node)]) * 32 +
                 static_cast<std::size_t>(std::min(component_, 31));
-    out.size = class_of((near + 2 * own + before + lively / 8 + near_lively_ / 8) / 2);
+    out.size = class_of((near + 2 * own + before + lively / 8 + static_cast<int>(near_lively_ / 8)) / 2);
     out.at[4] = out.size * axes + d;
     out.set = out.size;
     return out;
@@ -99,7 +99,7 @@ class Memory {
   std::vector<std::uint8_t> now_, before_, earlier_;
   std::vector<std::uint16_t> lively_;
   std::array<int, 3> near_{};
-  int near_lively_ = 0;
+  std::int64_t near_lively_ = 0;  // a vertex may have millions of neighbours
   int component_ = 0;
 };
 

@@ -116,7 +116,9 @@ class Coder {
       out.add_section(fmt::format("b{}", b), blocks[b].basis_bytes);
       out.add_section(fmt::format("w{}", b), blocks[b].weight_bytes);
     }
-    return finish_mesh_stream(std::move(out), layout_of(mesh_));
+    Eigen::Index most = 0;
+    for (const Block& block : blocks) most = std::max(most, block.paths.cols());
+    return finish_mesh_stream(std::move(out), layout_of(mesh_), most * mesh_.vertices);
   }
 
   const MeshSequence& mesh_;

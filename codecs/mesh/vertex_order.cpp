@@ -15,7 +15,10 @@ constexpr std::size_t most_candidates = 80;
 class Order {
  public:
   Order(int points, std::span<const Triangle> triangles)
-      : neighbours_(points, triangles), taken_(static_cast<std::size_t>(points)), seen_(taken_.size(), -1) {}
+      : neighbours_(points, triangles),
+        taken_(static_cast<std::size_t>(points)),
+        taken_near_(taken_.size()),
+        seen_(taken_.size(), -1) {}
 
   [[nodiscard]] const std::vector<std::int32_t>& candidates() {
     list_.clear();
@@ -23,6 +26,7 @@ class Order {
     for (std::size_t i = 0; i < back && list_.size() < most_candidates; ++i) {
       const std::int32_t p = latest_[latest_.size() - 1 - i];
       const std::size_t from = list_.size();
+      looked_at_ += static_cast<std::int64_t>(neighbours_.of(p).size());
       for (const std::int32_t q : neighbours_.of(p)) {
         if (taken_[static_cast<std::size_t>(q)] != 0 || seen_[static_cast<std::size_t>(q)] == turn_) continue;
         seen_[static_cast<std::size_t>(q)] = turn_;
@@ -30,7 +34,9 @@ class Order {
       }
       // Those with more neighbours taken are likelier.
       std::stable_sort(list_.begin() + static_cast<std::ptrdiff_t>(from), list_.end(),
-                       [&](std::int32_t a, std::int32_t b) { return taken_near(a) > taken_near(b); });
+                       [&](std::int32_t a, std::int32_t b) {
+                         return taken_near_[static_cast<std::size_t>(a)] > taken_near_[static_cast<std::size_t>(b)];
+                       });
     }
     if (list_.size() > most_candidates) list_.resize(most_candidates);
     ++turn_;
@@ -40,7 +46,10 @@ class Order {
   void take(std::int32_t p) {
     taken_[static_cast<std::size_t>(p)] = 1;
     latest_.push_back(p);
+    looked_at_ += static_cast<std::int64_t>(neighbours_.of(p).size());
+    for (const std::int32_t q : neighbours_.of(p)) ++taken_near_[static_cast<std::size_t>(q)];
   }
+  [[nodiscard]] std::int64_t looked_at() const { return looked_at_; }
   // Where a point that is not among the candidates is expected: beside the latest one.
   [[nodiscard]] std::int32_t expected() const { return latest_.empty() ? 0 : latest_.back(); }
   [[nodiscard]] int context() const { return context_; }
@@ -50,17 +59,14 @@ class Order {
   }
 
  private:
-  [[nodiscard]] int taken_near(std::int32_t p) const {
-    int count = 0;
-    for (const std::int32_t q : neighbours_.of(p)) count += taken_[static_cast<std::size_t>(q)];
-    return count;
-  }
   Neighbours neighbours_;
   std::vector<std::uint8_t> taken_;
+  std::vector<std::int32_t> taken_near_;  // neighbours of each
   std::vector<std::int32_t> seen_;
   std::vector<std::int32_t> latest_;
   std::vector<std::int32_t> list_;
   std::int32_t turn_ = 0;
+  std::int64_t looked_at_ = 0;  // neighbours
   int context_ = 4;
 };
 
@@ -68,7 +74,8 @@ constexpr int far_context = 6;
 
 }  // namespace
 
-void put_order(IntegerWriter& out, std::span<const std::int32_t> point_of, std::span<const Triangle> triangles) {
+std::int64_t put_order(IntegerWriter& out, std::span<const std::int32_t> point_of,
+                       std::span<const Triangle> triangles) {
   Order order(static_cast<int>(point_of.size()), triangles);
   for (const std::int32_t p : point_of) {
     const auto& list = order.candidates();
@@ -79,6 +86,7 @@ void put_order(IntegerWriter& out, std::span<const std::int32_t> point_of, std::
     order.note(place);
     order.take(p);
   }
+  return order.looked_at();
 }
 
 std::vector<std::int32_t> get_order(IntegerReader& in, int vertices, std::span<const Triangle> triangles) {

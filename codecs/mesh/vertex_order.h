@@ -17,7 +17,8 @@
 namespace kinespace {
 
 // `point_of`: the point of each vertex, each once; as many points as vertices. `triangles` are of points.
-void put_order(IntegerWriter& out, std::span<const std::int32_t> point_of, std::span<const Triangle> triangles);
+// Returns how many neighbours were looked at, which is what it costs: at most 25 times those there are.
+std::int64_t put_order(IntegerWriter& out, std::span<const std::int32_t> point_of, std::span<const Triangle> triangles);
 // Throws Error{bad_input}.
 [[nodiscard]] std::vector<std::int32_t> get_order(IntegerReader& in, int vertices, std::span<const Triangle> triangles);
 

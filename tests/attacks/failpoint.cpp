@@ -6,6 +6,7 @@
 //   KINESPACE_FAILPOINT_COUNT=F   at the end, the numbers of both kinds of calls are written into file F
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <csignal>
 #include <cstdarg>
 #include <cstdio>
@@ -41,7 +42,7 @@ void read_wish() {
   const char* text = std::getenv("KINESPACE_FAILPOINT");
   if (text == nullptr) return;
   const char* number = std::strchr(text, ':');
-  wanted = number == nullptr ? 0 : std::strtol(number + 1, nullptr, 10);
+  if (number != nullptr) std::from_chars(number + 1, text + std::strlen(text), wanted);
   const auto is = [&](const char* name) { return std::strncmp(text, name, std::strlen(name)) == 0; };
   wish = is("alloc") ? Wish::alloc : is("disk") ? Wish::disk : is("kill") ? Wish::kill : Wish::none;
 }

@@ -51,7 +51,7 @@ TEST(MeshFiles, sequences_survive_numpy_obj_and_ply_to_the_last_bit) {
   for (const MeshFormat format : {MeshFormat::numpy, MeshFormat::obj, MeshFormat::ply}) {
     const auto path = folder.path() / std::to_string(static_cast<int>(format));
     write_mesh_sequence(path, mesh, format);
-    const MeshSequence back = read_mesh_sequence(path, 25);
+    const MeshSequence back = read_mesh_sequence(path, {.rate_hz = 25});
     expect_same(mesh, back);
     EXPECT_EQ(back.rate_hz, 25);
   }
@@ -66,7 +66,7 @@ TEST(MeshFiles, sequences_survive_gltf) {
     const MeshSequence back = read_mesh_sequence(folder / name);
     expect_same(mesh, back, 2e-6F);
     EXPECT_EQ(back.rate_hz, 24);
-    EXPECT_NEAR(read_mesh_sequence(folder / name, 48).frames, 23, 0);
+    EXPECT_NEAR(read_mesh_sequence(folder / name, {.rate_hz = 48}).frames, 23, 0);
   }
   MeshSequence still = sheet(4, 4, 1);
   write_mesh_sequence(folder / "still.glb", still, MeshFormat::gltf);

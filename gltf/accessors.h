@@ -6,15 +6,15 @@
 #include <string>
 #include <vector>
 
-namespace tinygltf {
-class Model;
-}
+#include "gltf/budget.h"
+#include "gltf/document.h"
 
-namespace kinespace {
+namespace kinespace::gltf {
 
-class GltfAccessors {
+class Accessors {
  public:
-  GltfAccessors(const tinygltf::Model& model, std::string file);
+  // What is read is taken from the budget. All three must outlive this.
+  Accessors(const Document& document, const std::string& file, Budget& budget);
 
   // The numbers of an accessor with `width` components an element; integers as they are, or scaled when normalised.
   // Throws Error{bad_input} when there is no such accessor, it has another width, or it reaches beyond its buffer.
@@ -22,6 +22,7 @@ class GltfAccessors {
   [[nodiscard]] std::vector<std::uint32_t> indices(int accessor, int width) const;
 
   [[noreturn]] void fail(std::string found, std::string expected, std::string remedy = {}) const;
+  [[nodiscard]] Budget& budget() const { return budget_; }
 
  private:
   struct View {
@@ -30,14 +31,16 @@ class GltfAccessors {
     std::size_t count;
     int component;
   };
-  [[nodiscard]] View view_of(int buffer_view, std::size_t offset, std::size_t count, int component, int width) const;
+  [[nodiscard]] View view_of(int buffer_view, std::uint64_t offset, std::uint64_t count, int component,
+                             int width) const;
   [[nodiscard]] std::size_t count_of(int accessor, int width) const;
   template <typename T>
   void read(int accessor, int width, std::vector<T>& out) const;
 
-  const tinygltf::Model& model_;
-  std::string file_;
-  std::size_t most_count_ = 0;  // of the accessors with data behind them
+  const Document& document_;
+  const std::string& file_;
+  Budget& budget_;
+  std::uint64_t most_count_ = 0;  // of the accessors with data behind them
 };
 
-}  // namespace kinespace
+}  // namespace kinespace::gltf

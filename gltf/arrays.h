@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include <tiny_gltf.h>
+#include "gltf/tiny.h"
 
 namespace kinespace {
 

@@ -1,0 +1,5 @@
+// The one place where tinygltf is compiled.
+#include <fstream>
+
+#define TINYGLTF_IMPLEMENTATION
+#include "gltf/tiny.h"
