@@ -139,9 +139,13 @@ void run_decode(const DecodeOptions& options) {
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::vector<fs::path> files = output_files(clips, options);
   double frames = 0;
+  std::set<fs::path> folders;
   for (std::size_t c = 0; c < clips.size(); ++c) {
     Session::check_stop();
-    if (files[c] != options.output) fs::create_directories(files[c].parent_path());
+    if (files[c] != options.output && folders.insert(files[c].parent_path()).second) {
+      fs::create_directories(files[c].parent_path());
+      remove_leftovers(files[c].parent_path());
+    }
     write_clip(files[c], clips[c]);
     frames += clips[c].frames;
   }
