@@ -54,16 +54,19 @@ bool is_file(const std::string& text) {
 }
 
 std::vector<Match> nearest(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
-                           const QueryCommandOptions& options, const std::string& except, const Compute& compute) {
-  if (!options.windows) return nearest_motions(library, curves, skeleton, options.query, except, compute);
+                           const QueryCommandOptions& options, const std::string& except, const Compute& compute,
+                           const Progress& progress) {
+  if (!options.windows) return nearest_motions(library, curves, skeleton, options.query, except, compute, progress);
   return nearest_windows(library, curves, skeleton, options.range,
                          {.k = options.query.k, .overlapping = options.overlapping, .labels = options.query.labels},
                          {.weighted = options.query.weighted}, except);
 }
 
-std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute) {
+std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute,
+                        const Progress& progress) {
   if (is_file(options.clip)) {
-    const Clip clip = read_clip(options.clip);
+    Clip clip = read_clip(options.clip);
+    progress.check_stop();
     if (!library.space_for(clip.skeleton)) {
       throw Error(ErrorKind::bad_input,
                   {.file = options.clip,
@@ -71,17 +74,20 @@ std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options
                    .expected = "the joint names, parents and channels of its clips",
                    .remedy = "kinespace build --add --by-skeleton adds clips of another skeleton"});
     }
-    return nearest(library, clip_curves(clip), clip.skeleton, options, {}, compute);
+    const ClipCurves curves = clip_curves(clip);
+    const Skeleton skeleton = std::move(clip.skeleton);
+    clip = {};  // a long one takes as much as its curves
+    return nearest(library, curves, skeleton, options, {}, compute, progress);
   }
   const ClipRow row = library.require_clip(options.clip);
-  return nearest(library, library.curves(row), library.skeleton(row.skeleton_id), options, row.name, compute);
+  return nearest(library, library.curves(row), library.skeleton(row.skeleton_id), options, row.name, compute, progress);
 }
 
-void run_query(QueryCommandOptions options) {
+void run_query(QueryCommandOptions options, Session& session) {
   options.query.rerank = !options.no_rerank;
   options.query.validate();
   LibraryView library(options.library);
-  const std::vector<Match> matches = find(library, options, Compute::open(options.device));
+  const std::vector<Match> matches = find(library, options, Compute::open(options.device), session.stops());
   options.json ? print_json(to_json(options.clip, matches)) : print_matches(matches);
 }
 
@@ -109,7 +115,7 @@ void add_query(CLI::App& app, Session& session) {
   command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
   command->add_flag("--json", options->json, "Print the matches as one JSON object");
   session.files.reads(command, {"LIB", "CLIP"});
-  command->callback([options] { run_query(*options); });
+  command->callback([options, &session] { run_query(*options, session); });
 }
 
 }  // namespace kinespace::cli
