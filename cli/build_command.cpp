@@ -48,20 +48,13 @@ Grouping grouping_of(const std::string& name) {
 }
 
 // A build that is stopped keeps what it has read.
-LibraryReport build_or_tell_what_stays(const std::vector<std::filesystem::path>& files, const BuildOptions& options,
-                                       const Compute& compute, Session& session) {
-  try {
-    return build_library(files, options.output, options.library, compute, session.progress());
-  } catch (const Interrupted&) {
-    const std::string partial = options.output.string() + ".partial";
-    std::error_code ignored;
-    if (std::filesystem::exists(partial, ignored)) {
-      session.when_stopped = fmt::format(
-          "stopped; {} is as it was, and {} keeps the clips that were read: the same command goes on from there",
-          options.output.string(), partial);
-    }
-    throw;
-  }
+std::string what_a_stopped_build_leaves(const std::filesystem::path& output) {
+  const std::string partial = output.string() + ".partial";
+  std::error_code ignored;
+  if (!std::filesystem::exists(partial, ignored)) return "stopped; nothing half-written is left";
+  return fmt::format(
+      "stopped; {} is as it was, and {} keeps the clips that were read: the same command goes on from there",
+      output.string(), partial);
 }
 
 void run_build(BuildOptions options, Session& session) {
@@ -74,7 +67,8 @@ void run_build(BuildOptions options, Session& session) {
   const Compute compute = Compute::open(options.device);
   const auto files = find_motion_files(options.inputs);
   session.detail(fmt::format("{} motion files", files.size()));
-  const LibraryReport report = build_or_tell_what_stays(files, options, compute, session);
+  session.when_stopped = [output = options.output] { return what_a_stopped_build_leaves(output); };
+  const LibraryReport report = build_library(files, options.output, library, compute, session.progress());
   session.finish_progress();
   for (const std::string& doubt : report.doubts) session.note(doubt);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;

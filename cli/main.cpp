@@ -15,6 +15,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include "base/error.h"
@@ -84,7 +85,7 @@ int run(CLI::App& app, const kinespace::cli::Session& session, int argc, char** 
   } catch (const kinespace::Error& error) {
     return report(error.kind(), kinespace::cli::in_users_words(app, error));
   } catch (const kinespace::Interrupted&) {
-    kinespace::cli::tell(session.when_stopped);
+    kinespace::cli::tell(session.when_stopped());
     return 128 + kinespace::cli::stop_signal();
   } catch (const std::bad_alloc&) {
     return report(ErrorKind::machine, no_memory);
@@ -97,6 +98,17 @@ int run(CLI::App& app, const kinespace::cli::Session& session, int argc, char** 
   }
 }
 
+// OpenBLAS starts its threads, which we never use, when it is loaded; each takes 128 MiB of address space and where a
+// limit leaves none asks again without end, so that even exit waits for ever. Under a limit the command starts again
+// with the one thing that OpenBLAS listens to. What cannot be started again goes on as it is.
+void start_again_with_one_blas_thread(char** argv) {
+  constexpr const char* variable = "OPENBLAS_NUM_THREADS";
+  struct rlimit limit {};
+  if (::getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY || std::getenv(variable) != nullptr)
+    return;
+  if (::setenv(variable, "1", 1) == 0) ::execv("/proc/self/exe", argv);
+}
+
 // A result that did not reach its reader is no result: a full disk behind `> file` must not pass as success.
 int flush_results(int code) {
   if (kinespace::cli::finish_output()) return code;
@@ -106,6 +118,7 @@ int flush_results(int code) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  start_again_with_one_blas_thread(argv);
   std::set_new_handler(remember_lack_of_memory);
   std::set_terminate(end_at_once);
   try {
@@ -119,6 +132,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     app.fallthrough();  // global options may also stand after the subcommand
     kinespace::cli::add_all_commands(app, session);
+    kinespace::cli::end_when_stopped(session);
     const int code = run(app, session, argc, argv);
     session.finish_progress();
     return flush_results(code);

@@ -58,18 +58,20 @@ bool is_file(const std::string& text, const Library& library) {
 }
 
 std::vector<Match> nearest(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
-                           const QueryCommandOptions& options, const std::string& except, const Compute& compute) {
-  if (!options.windows) return nearest_motions(library, curves, skeleton, options.query, except, compute);
+                           const QueryCommandOptions& options, const std::string& except, const Compute& compute,
+                           const Progress& progress) {
+  if (!options.windows) return nearest_motions(library, curves, skeleton, options.query, except, compute, progress);
   return nearest_windows(library, curves, skeleton, options.range,
                          {.k = options.query.k, .overlapping = options.overlapping, .labels = options.query.labels},
                          {.weighted = options.query.weighted}, except);
 }
 
 std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute,
-                        Session& session) {
+                        const Progress& progress, Session& session) {
   if (is_file(options.clip, library.library())) {
-    const Clip clip = read_clip(options.clip);
+    Clip clip = read_clip(options.clip);
     session.note_doubts(clip);
+    progress.check_stop();
     if (!library.space_for(clip.skeleton)) {
       throw Error(ErrorKind::bad_input,
                   {.file = options.clip,
@@ -77,17 +79,21 @@ std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options
                    .expected = "the joint names, parents and channels of its clips",
                    .remedy = "kinespace build --add --by-skeleton adds clips of another skeleton"});
     }
-    return nearest(library, clip_curves(clip), clip.skeleton, options, {}, compute);
+    const ClipCurves curves = clip_curves(clip);
+    const Skeleton skeleton = std::move(clip.skeleton);
+    clip = {};  // a long one takes as much as its curves
+    return nearest(library, curves, skeleton, options, {}, compute, progress);
   }
   const ClipRow row = library.require_clip(options.clip);
-  return nearest(library, library.curves(row), library.skeleton(row.skeleton_id), options, row.name, compute);
+  return nearest(library, library.curves(row), library.skeleton(row.skeleton_id), options, row.name, compute, progress);
 }
 
 void run_query(QueryCommandOptions options, Session& session) {
   options.query.rerank = !options.no_rerank;
   options.query.validate();
   LibraryView library(options.library);
-  const std::vector<Match> matches = find(library, options, Compute::open(options.device), session);
+  const std::vector<Match> matches =
+      find(library, options, Compute::open(options.device), session.stops(), session);
   options.json ? print_json(to_json(options.clip, matches)) : print_matches(matches);
 }
 

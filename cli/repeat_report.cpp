@@ -96,7 +96,7 @@ void report_repeats(const RepeatReportOptions& options, Session& session) {
   const std::vector<Clip> clips = read_clips(options, progress);
   progress.at("analysing", 0);
   const FrameTable table = marker_table(clips);
-  const RepeatAnalysis analysis = analyse_repeats(table);
+  const RepeatAnalysis analysis = analyse_repeats(table, {}, progress);
   Session::check_stop();
   Json report{{"kind", "repeats"},
               {"clips", clips.size()},

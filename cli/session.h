@@ -1,6 +1,7 @@
 // What every subcommand shares: the global options, the progress display, the wish to stop, and notes to the user.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -15,6 +16,10 @@ namespace kinespace::cli {
 // From here on Ctrl-C (SIGINT) and SIGTERM only leave a mark, which the work polls; the second one ends the process at
 // once.
 void catch_stop_signals();
+class Session;
+// And work that does not poll in time is ended: half a second after a signal, wherever it is, the files that it was
+// about to put in their places are removed and the process ends as if it had polled. Until the session ends.
+void end_when_stopped(const Session& session);
 // For work that has nothing half-written to take back: from here on a signal ends the program.
 void stop_at_once();
 // The signal that came, 0 while none did.
@@ -26,12 +31,19 @@ class Session {
   bool verbose = false;  // more notes
 
   FileOptions files;  // which options name files
-  // What is told when a signal has stopped the work.
-  std::string when_stopped = "stopped; nothing half-written is left";
+  // What is told when a signal has stopped the work. May be asked by another thread while the work goes on.
+  std::function<std::string()> when_stopped = [] { return "stopped; nothing half-written is left"; };
+
+  Session() = default;
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
 
   // For the library's long calls: reports to the bar (unless quiet) and stops on a signal. It must not outlive the
   // session.
   [[nodiscard]] Progress progress();
+  // The same without a bar, for work that is over soon as a rule.
+  [[nodiscard]] static Progress stops();
   // Ends the bar, before results are printed.
   void finish_progress() { bar_.reset(); }
 

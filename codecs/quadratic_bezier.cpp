@@ -121,6 +121,7 @@ BezierCurve fit_quadratic_bezier(std::span<const double> values, int dimensions,
     if (waiting.empty()) waiting.push_back(std::min(last - first, options.interval) + first);
     const int end = waiting.back();
     int worst = first;
+    out.fitted += end - first;
     if (segment.fit(first, end, worst) > options.max_squared_distance) {
       waiting.push_back(worst);
       continue;

@@ -12,6 +12,7 @@
 // the order of breaking does not matter and what was fitted stays.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -29,6 +30,7 @@ struct BezierCurve {
   std::vector<int> breaks;      // frames, ascending, the first 0 and the last the last
   std::vector<double> ends;     // [break][dimension]
   std::vector<double> middles;  // [segment][dimension]
+  std::int64_t fitted = 0;      // frames that fitting went over, those of segments that were broken again too
 
   [[nodiscard]] int frames() const { return breaks.back() + 1; }
   [[nodiscard]] int segments() const { return static_cast<int>(breaks.size()) - 1; }

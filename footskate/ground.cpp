@@ -84,16 +84,23 @@ struct Level {
 
 Level heaviest_level(std::vector<Rest> rests, double band) {
   std::ranges::sort(rests, {}, [](const Rest& r) { return r.place.y(); });
-  Level best;
   const double all = total(rests);
+  double heaviest = 0;
+  std::span<const Rest> group;
+  double sum = 0;  // of rests i to j - 1; weights are whole numbers, so nothing is lost in taking them off again
+  std::size_t j = 0;
   for (std::size_t i = 0; i < rests.size(); ++i) {
-    double sum = 0;
-    std::size_t j = i;
     for (; j < rests.size() && rests[j].place.y() <= rests[i].place.y() + 2 * band; ++j) sum += weight(rests[j]);
-    if (sum / all <= best.share) continue;
-    best = {.height = middle_height(std::span(rests).subspan(i, j - i), sum), .share = sum / all};
-    for (; j < rests.size(); ++j) best.above += weight(rests[j]) / all;
+    if (sum > heaviest) {
+      heaviest = sum;
+      group = std::span(rests).subspan(i, j - i);
+    }
+    sum -= weight(rests[i]);
   }
+  if (group.empty()) return {};
+  Level best{.height = middle_height(group, heaviest), .share = heaviest / all};
+  for (const Rest* r = group.data() + group.size(); r != rests.data() + rests.size(); ++r)
+    best.above += weight(*r) / all;
   return best;
 }
 
@@ -114,9 +121,10 @@ Ground fit_plane(const std::vector<Rest>& rests, double band, double& share) {
     tolerance = std::max(band, pass == 0 ? 3 * band : 1.5 * band);
   }
   share = 0;
+  const double all = total(rests);
   for (const Rest& r : rests) {
     const double off = r.place.y() - plane.dot(Eigen::Vector3d(1, r.place.x(), r.place.z()));
-    if (std::abs(off) <= band) share += weight(r) / total(rests);
+    if (std::abs(off) <= band) share += weight(r) / all;
   }
   return {.kind = GroundKind::slope, .height_cm = plane.x(), .gradient = {plane.y(), plane.z()}};
 }

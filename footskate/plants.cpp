@@ -1,6 +1,7 @@
 #include "footskate/plants.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -40,6 +41,14 @@ class Placer {
   Placer(const FootTracks& tracks, const Ground& ground, const FootContacts& contacts) : t_(tracks), ground_(ground) {
     for (const FootContact& c : contacts) plants_.push_back({.contact = c});
     placed_.assign(plants_.size(), 0);
+    for (std::size_t i = 0; i < plants_.size(); ++i) {
+      Slot& slot = slots_[plants_[i].contact.slot];
+      slot.in_time.push_back(i);
+      slot.longest = std::max(slot.longest, length(plants_[i].contact));
+    }
+    for (Slot& slot : slots_) {
+      std::ranges::sort(slot.in_time, {}, [&](std::size_t i) { return plants_[i].contact.first_frame; });
+    }
   }
 
   std::vector<Plant> place() {
@@ -61,16 +70,27 @@ class Placer {
     std::vector<std::size_t> stance = {first};
     for (std::size_t next = 0; next < stance.size(); ++next) {
       const std::size_t from = stance[next];
-      for (std::size_t i = 0; i < plants_.size(); ++i) {
-        const FootContact& a = plants_[from].contact;
-        const FootContact& b = plants_[i].contact;
-        if (placed_[i] != 0 || a.slot / 2 != b.slot / 2 || a.slot == b.slot || overlap(a, b) < 1) continue;
-        plants_[i].place = plants_[from].place + mean_way(a, b);
+      for (const std::size_t i : overlapping(plants_[from].contact)) {
+        if (placed_[i] != 0) continue;
+        plants_[i].place = plants_[from].place + mean_way(plants_[from].contact, plants_[i].contact);
         placed_[i] = 1;
         stance.push_back(i);
       }
     }
     settle(stance);
+  }
+
+  // The plants of the foot's other joint that overlap with `a`, in order.
+  [[nodiscard]] std::vector<std::size_t> overlapping(const FootContact& a) const {
+    const Slot& slot = slots_[a.slot ^ 1];
+    const auto first = std::ranges::lower_bound(slot.in_time, a.first_frame - slot.longest, {},
+                                                [&](std::size_t i) { return plants_[i].contact.first_frame; });
+    std::vector<std::size_t> out;
+    for (auto at = first; at != slot.in_time.end() && plants_[*at].contact.first_frame <= a.last_frame; ++at) {
+      if (overlap(a, plants_[*at].contact) >= 1) out.push_back(*at);
+    }
+    std::ranges::sort(out);
+    return out;
   }
 
   // Sets a stance on the ground, by the longest stand of its lowest joint.
@@ -126,9 +146,16 @@ class Placer {
   }
 
   const FootTracks& t_;
+  // The plants of one joint.
+  struct Slot {
+    std::vector<std::size_t> in_time;
+    int longest = 0;  // frames
+  };
+
   const Ground& ground_;
   std::vector<Plant> plants_;
   std::vector<char> placed_;
+  std::array<Slot, 4> slots_;
 };
 
 Eigen::Quaterniond rotation(const Vector3d& turn) {

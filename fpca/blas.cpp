@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "kernels/blas_call.h"
 
 extern "C" {
 // Missing in other BLAS libraries, hence weak.
@@ -43,6 +44,7 @@ void add_gram(const double* x, std::ptrdiff_t rows, std::ptrdiff_t n, std::ptrdi
   if (rows == 0 || n == 0) return;
   const int size = blas_size(n), count = blas_size(rows), lead = std::max(size, blas_size(stride));
   const double one = 1;
+  const BlasCall call;
   dsyrk_("L", "N", &size, &count, &one, x, &lead, &one, c, &size);
 }
 
@@ -52,6 +54,7 @@ void project_rows(const double* x, std::ptrdiff_t rows, std::ptrdiff_t n, std::p
   const int m = blas_size(k), count = blas_size(rows), inner = blas_size(n);
   const int lead = std::max({1, inner, blas_size(stride)}), p_lead = std::max(1, inner);
   const double one = 1;
+  const BlasCall call;
   dgemm_("T", "N", &m, &count, &inner, &one, p, &p_lead, x, &lead, &beta, out, &m);
 }
 

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "fpca/blas.h"
+#include "kernels/blas_call.h"
 
 extern "C" {
 void dsytrd_(const char* uplo, const int* n, double* a, const int* lda, double* d, double* e, double* tau, double* work,
@@ -40,6 +41,7 @@ const Eigen::VectorXd& SymmetricEigen::decompose(const Eigen::MatrixXd& matrix) 
   work_.resize(64 * static_cast<std::size_t>(size_) + 64);
   int info = 0;
   const int work_size = static_cast<int>(work_.size());
+  const BlasCall call;
   dsytrd_("L", &size_, reflectors_.data(), &size_, diagonal_.data(), below_.data(), tau_.data(), work_.data(),
           &work_size, &info);
   require_success(info, "dsytrd");
@@ -55,6 +57,7 @@ const Eigen::MatrixXd& SymmetricEigen::vectors(int count) {
   count = std::clamp(count, 0, size_);
   vectors_.resize(size_, count);
   if (count == 0) return vectors_;
+  const BlasCall call;
   select_vectors(count);
   int info = 0;
   const int work_size = static_cast<int>(work_.size());

@@ -11,6 +11,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include "base/error.h"
+#include "kernels/blas_call.h"
 #include "kernels/covariance_detail.h"
 #include "kernels/simd.h"
 
@@ -76,10 +77,12 @@ struct Block {
     sum = Eigen::RowVectorXd::Zero(points);
     if constexpr (std::is_same_v<T, float>) {
       centre_single(curves, stride, n, shift.data(), points, centred.data(), sum.data());
+      const BlasCall call;
       cblas_ssyrk(CblasRowMajor, CblasLower, CblasTrans, points, n, 1, centred.data(), points, 0, scatter.data(),
                   points);
     } else {
       centre_double(curves, stride, n, shift.data(), points, centred.data(), sum.data());
+      const BlasCall call;
       cblas_dsyrk(CblasRowMajor, CblasLower, CblasTrans, points, n, 1, centred.data(), points, 0, scatter.data(),
                   points);
     }

@@ -8,6 +8,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include "base/error.h"
+#include "kernels/blas_call.h"
 #include "kernels/keyframe_distance_detail.h"
 
 namespace kinespace {
@@ -36,8 +37,11 @@ void distances_of_rows(const Factors& factors, Eigen::Index first, Eigen::Index 
   const auto m = static_cast<int>(factors.b.rows());
   const auto d = static_cast<int>(factors.a.cols());
   float* to = out.data() + first * out.cols();
-  cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, n, m, d, -2, factors.a.data() + first * d, d, factors.b.data(),
-              d, 0, to, m);
+  {
+    const BlasCall call;
+    cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasTrans, n, m, d, -2, factors.a.data() + first * d, d, factors.b.data(),
+                d, 0, to, m);
+  }
   for (Eigen::Index i = first; i < first + count; ++i) {
     auto row = out.row(i).array();
     row = (row + factors.b_norms.transpose().array() + factors.a_norms[i]).max(0.0F);

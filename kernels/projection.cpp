@@ -8,6 +8,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include "base/error.h"
+#include "kernels/blas_call.h"
 #include "kernels/projection_detail.h"
 
 namespace kinespace {
@@ -33,6 +34,7 @@ void gemm(Eigen::Index n, Eigen::Index m, Eigen::Index k, const T* a, Eigen::Ind
           Eigen::Index b_stride, T beta, T* out) {
   const auto turned = turn_b ? CblasTrans : CblasNoTrans;
   const auto size = [](Eigen::Index x) { return static_cast<int>(x); };
+  const BlasCall call;
   if constexpr (std::is_same_v<T, float>) {
     cblas_sgemm(CblasRowMajor, CblasNoTrans, turned, size(n), size(m), size(k), 1, a, size(a_stride), b, size(b_stride),
                 beta, out, size(m));

@@ -42,21 +42,73 @@ std::vector<Candidate> nearest_vectors(const RetrievalMatrix& matrix, const std:
   return out;
 }
 
+// Candidates whose features are in memory together, and what the DTW makes of them.
+class RerankBatch {
+ public:
+  RerankBatch(const ClipCurves& curves, const Skeleton& skeleton, const QueryOptions& options, const Compute& compute)
+      : options_(options), compute_(compute) {
+    const PoseFeatures features = pose_features(curves, skeleton);
+    query_ = {curves.frames(), features.rows};
+    queries_.dims = targets_.dims = features.dims;
+    queries_.add(features.values);
+  }
+
+  // True when the batch is large enough to be worked off.
+  bool add(Candidate& candidate, int frames, const PoseFeatures& features) {
+    targets_.add(features.values);
+    bands_.push_back(rerank_band(options_.band, query_, {frames, features.rows}));
+    waiting_.push_back(&candidate);
+    return targets_.values.size() >= most_numbers;
+  }
+
+  // Pairs of one band go together.
+  void work_off() {
+    std::vector<bool> done(waiting_.size(), false);
+    for (std::size_t first = 0; first < waiting_.size(); ++first) {
+      if (done[first]) continue;
+      std::vector<ClipPair> pairs;
+      for (std::size_t i = first; i < waiting_.size(); ++i) {
+        if (bands_[i] != bands_[first]) continue;
+        pairs.push_back({0, static_cast<int>(i)});
+        done[i] = true;
+      }
+      const auto matches = dtw(queries_, targets_, pairs, {.band_fraction = bands_[first]}, compute_);
+      for (std::size_t p = 0; p < pairs.size(); ++p) {
+        waiting_[static_cast<std::size_t>(pairs[p].target)]->cost = matches[p].normalised;
+      }
+    }
+    waiting_.clear();
+    bands_.clear();
+    targets_ = {.dims = queries_.dims};
+  }
+
+ private:
+  static constexpr std::size_t most_numbers = std::size_t{1} << 24;  // 64 MiB
+
+  const QueryOptions& options_;
+  const Compute& compute_;
+  RerankClip query_;
+  FeatureSet queries_;
+  FeatureSet targets_;
+  std::vector<double> bands_;
+  std::vector<Candidate*> waiting_;
+};
+
 void rerank(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton, const QueryOptions& options,
-            const Compute& compute, std::vector<Candidate>& candidates) {
-  const PoseFeatures query = pose_features(curves, skeleton);
-  FeatureSet queries{.dims = query.dims};
-  queries.add(query.values);
-  FeatureSet targets{.dims = query.dims};
-  for (const Candidate& candidate : candidates) {
+            const Compute& compute, const Progress& progress, std::vector<Candidate>& candidates) {
+  RerankBatch batch(curves, skeleton, options, compute);
+  for (Candidate& candidate : candidates) {
+    progress.check_stop();
     const ClipRow row = library.library().clip(candidate.clip_id);
     // What the first functions leave out is far below what tells two motions apart.
     constexpr int functions = 12;
-    targets.add(pose_features(library.curves(row, functions), library.skeleton(row.skeleton_id)).values);
+    const ClipCurves target = library.curves(row, functions);
+    if (batch.add(candidate, target.frames(), pose_features(target, library.skeleton(row.skeleton_id)))) {
+      batch.work_off();
+    }
   }
-  const auto pairs = all_pairs(1, targets.clips());
-  const auto matches = dtw(queries, targets, pairs, {.band_fraction = options.band}, compute);
-  for (std::size_t i = 0; i < candidates.size(); ++i) candidates[i].cost = matches[i].normalised;
+  progress.check_stop();
+  batch.work_off();
   std::ranges::stable_sort(candidates, {}, &Candidate::cost);
 }
 
@@ -71,8 +123,19 @@ void QueryOptions::validate() const {
   if (!(band > 0 && band <= 1)) fail(fmt::format("band = {}", band), "above 0, up to 1");
 }
 
+double rerank_band(double band, const RerankClip& a, const RerankClip& b) {
+  constexpr int ordinary_frames = 10'000;
+  constexpr double most_cells = 1e7;
+  constexpr double least_keyframes = 100;
+  if (std::max(a.frames, b.frames) <= ordinary_frames) return band;
+  const double all_cells = static_cast<double>(a.keyframes) * static_cast<double>(b.keyframes);
+  const double least = least_keyframes / std::max({1, a.keyframes, b.keyframes});
+  return std::min(band, std::max(most_cells / (2 * std::max(all_cells, 1.0)), least));
+}
+
 std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
-                                   const QueryOptions& options, const std::string& except, const Compute& compute) {
+                                   const QueryOptions& options, const std::string& except, const Compute& compute,
+                                   const Progress& progress) {
   options.validate();
   const auto space_id = library.space_for(skeleton);
   if (!space_id) return {};
@@ -89,7 +152,7 @@ std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curve
   const std::size_t keep = options.rerank ? std::max(wanted, static_cast<std::size_t>(options.candidates)) : wanted;
   const std::vector<ClipRow> rows = library.library().clips();
   std::vector<Candidate> found = nearest_vectors(matrix, query, weights, rows, options, except, keep);
-  if (options.rerank) rerank(library, curves, skeleton, options, compute, found);
+  if (options.rerank) rerank(library, curves, skeleton, options, compute, progress, found);
   found.resize(std::min(found.size(), wanted));
 
   std::vector<Match> out;
@@ -107,8 +170,8 @@ std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curve
 }
 
 std::vector<Match> nearest_motions(LibraryView& library, const Clip& clip, const QueryOptions& options,
-                                   const std::string& except, const Compute& compute) {
-  return nearest_motions(library, clip_curves(clip), clip.skeleton, options, except, compute);
+                                   const std::string& except, const Compute& compute, const Progress& progress) {
+  return nearest_motions(library, clip_curves(clip), clip.skeleton, options, except, compute, progress);
 }
 
 }  // namespace kinespace

@@ -4,12 +4,14 @@
 // The vectors are searched by the exact L2 distance of all dimensions (eq. 3, or eq. 14 with joint weights); the
 // `candidates` best are then compared by DTW of their keyframes (eq. 12; a slanted band of 10 % of the length, cost
 // divided by the sum of both lengths, since a sum alone favours short clips) and ordered by that. Ties go to the clip
-// that was added first.
+// that was added first. Of a clip of more than 10 000 frames the band is narrower, by rerank_band, so that a clip that
+// is ten times as long takes ten times the work and not a hundred times.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "base/progress.h"
 #include "fpca/library_view.h"
 #include "kernels/device.h"
 
@@ -27,6 +29,14 @@ struct QueryOptions {
   void validate() const;
 };
 
+// What share of the lengths the band of a pair is: `band`, but for pairs with a clip of more than 10 000 frames as much
+// as makes ten million cells, or 100 keyframes (3.3 s) to both sides where that is more.
+struct RerankClip {
+  int frames = 0;
+  int keyframes = 0;  // fpca/pose_features.h
+};
+[[nodiscard]] double rerank_band(double band, const RerankClip& a, const RerankClip& b);
+
 struct Match {
   std::string clip;
   double distance = 0;         // with rerank the normalised DTW cost, else the L2 distance of the vectors
@@ -40,10 +50,11 @@ struct Match {
 // joint tree: no matches. The clip may be of any frame rate and of other bone lengths.
 [[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const Clip& clip,
                                                  const QueryOptions& options = {}, const std::string& except = {},
-                                                 const Compute& compute = {});
+                                                 const Compute& compute = {}, const Progress& progress = {});
 // The same for curves of a skeleton, as LibraryView::curves gives them.
 [[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curves,
                                                  const Skeleton& skeleton, const QueryOptions& options = {},
-                                                 const std::string& except = {}, const Compute& compute = {});
+                                                 const std::string& except = {}, const Compute& compute = {},
+                                                 const Progress& progress = {});
 
 }  // namespace kinespace

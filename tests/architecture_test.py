@@ -35,6 +35,14 @@ NUMBER_READERS = re.compile(r"\b(?:std::)?(?:sto(?:i|l|ll|ul|ull|f|d|ld)|ato(?:i
 SETS_LOCALE = re.compile(r"\bsetlocale\s*\(")
 # Streams, by the name they are declared with: what is read from them with >> obeys the locale and fails without a word.
 STREAMS = re.compile(r"\bstd::w?(?:istream|iostream|i?fstream|i?stringstream)\s*&?\s*(\w+)")
+# What tells a test how late it is. A test that looks at it passes or fails with the machine and its load.
+CLOCK = re.compile(
+    r"\b\w+_clock\b|\b[cC]lock::now\b|\btick_count\b|\belapsed_time\b|\b_*rdtscp?\b"
+    r"|\b(?:clock_gettime|timespec_get|gettimeofday|getrusage|omp_get_wtime)\b|\b(?:std::)?(?:clock|times)\s*\(\s*[)&]"
+    r"|(?<![\w.>:])(?:std::|::)?time\s*\(\s*(?:nullptr|NULL|0|&)"
+)
+# Tests whose subject is time itself, and that assert nothing about it: file -> reason.
+CLOCKS_ALLOWED = {}
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"', re.MULTILINE)
 CATCH_ALL = re.compile(r"catch\s*\(\s*\.\.\.\s*\)\s*\{")
 LEFT_OPEN = re.compile(r"\b(?:TODO|FIXME|XXX|HACK)\b")
@@ -97,6 +105,14 @@ def locale(root, file, text):
         yield f"{found.group(0)}...) changes how numbers look; no code of ours depends on the locale"
 
 
+def clocks(root, file, text):
+    if file.parts[0] != "tests" or str(file) in CLOCKS_ALLOWED:
+        return
+    found = CLOCK.search(without_comments(text))
+    if found:
+        yield f"{found.group(0)} in a test: count bytes, allocations, steps or calls, which no machine changes"
+
+
 def left_open(root, file, text):
     found = LEFT_OPEN.search(text)
     if found:
@@ -108,7 +124,7 @@ def guarded(root, file, text):
         yield "a header without #pragma once"
 
 
-RULES = [arrows, length, catch_all, locale, left_open, guarded]
+RULES = [arrows, length, catch_all, locale, clocks, left_open, guarded]
 
 
 def findings(root, rules=RULES):
@@ -131,6 +147,7 @@ GOOD = {
     "kernels/tile.cl": "\n",
     "kernels/product.cl": '#include "tile.cl"\n',
     "tests/motion/clip_test.cpp": '#include "motion/clip.h"\n',
+    "tests/motion/wait_test.cpp": "std::this_thread::sleep_for(std::chrono::seconds(1)); double time(int at); clip.time(0);\n",
 }
 # One breach a rule, and what its finding must say.
 BREACHES = [
@@ -148,6 +165,12 @@ BREACHES = [
     (locale, "bench/words.cpp", "std::istringstream words(line); words >> number;\n", "by the locale"),
     (locale, "codecs/read.h", "#pragma once\nvoid read(std::istream& in, int& n) { in >> n; }\n", "by the locale"),
     (locale, "motion/comma.cpp", 'setlocale(LC_ALL, "");\n', "changes how numbers look"),
+    (clocks, "tests/motion/soon_test.cpp", "const auto start = std::chrono::steady_clock::now();\n", "in a test: count"),
+    (clocks, "tests/motion/cpu_test.cpp", "clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);\n", "in a test: count"),
+    (clocks, "tests/motion/ticks_test.cpp", "const std::clock_t start = std::clock();\n", "in a test: count"),
+    (clocks, "tests/motion/now_test.cpp", "using Clock = A;\nauto start = Clock::now();\n", "in a test: count"),
+    (clocks, "tests/motion/used_test.cpp", "getrusage(RUSAGE_SELF, &used);\n", "in a test: count"),
+    (clocks, "tests/motion/seed_test.cpp", "EXPECT_LT(std::time(nullptr) - start, 5);\n", "in a test: count"),
     (left_open, "base/later.cpp", "// TO" + "DO: finish\n", "left in"),
     (guarded, "base/twice.h", "int x();\n", "without #pragma once"),
 ]

@@ -57,7 +57,7 @@ RepeatEncoder::RepeatEncoder(std::span<const Clip> clips, const Preparation& pre
     starts_.push_back(start);
     start += clip.frames;
   }
-  if (preparation_.repeats) analysis_ = analyse_repeats(marker_table(aligned_), {});
+  if (preparation_.repeats) analysis_ = analyse_repeats(marker_table(aligned_), {}, progress_);
   progress_.check_stop();
   contacts_.resize(clips_.size());
   if (!preparation_.contacts) return;
@@ -258,8 +258,13 @@ void RepeatEncoder::find_predictions(double step) {
     const int last = p.last_frame() + 1;
     std::vector<std::size_t> rests_on;
     bool possible = !referred[w];
-    for (std::size_t r = first_of_clip_[clip]; r < first_of_clip_[clip + 1]; ++r) {
-      if (windows_[r].first > last || windows_[r].first + windows_[r].points <= first) continue;
+    // Windows of a clip follow one another in time.
+    const auto of_clip =
+        std::span(windows_).subspan(first_of_clip_[clip], first_of_clip_[clip + 1] - first_of_clip_[clip]);
+    const auto nearest = std::ranges::partition_point(
+        of_clip, [&](const WindowPlace& place) { return place.first + place.points <= first; });
+    for (auto r = first_of_clip_[clip] + static_cast<std::size_t>(nearest - of_clip.begin());
+         r < first_of_clip_[clip + 1] && windows_[r].first <= last; ++r) {
       possible = possible && r != w && !predictions_[r].used();
       rests_on.push_back(r);
     }

@@ -174,7 +174,7 @@ std::string repeat_picture_svg(const FrameTable& table, const RepeatAnalysis& an
                  .expected = fmt::format("a group of the analysis of these {} frames", table.frames)});
   }
   const int group = picture.group >= 0 ? picture.group : largest_group(table, analysis);
-  const auto parts = table_parts(analysis.grouping.ranges(group, table), table.rate_hz, options);
+  const auto parts = table_parts(analysis.grouping.ranges(group, table), table, options);
   return RepeatPicture(table, analysis, options, group, parts.front(), picture.size_px).finish();
 }
 

@@ -18,6 +18,7 @@ void RepeatOptions::validate() const {
   require_option("variance", variance, 0.5, 1);
   require_option("table_rate_hz", table_rate_hz, 1, 1000);
   require_option("table_frames", table_frames, 100, 200'000);
+  require_option("clip_frames", clip_frames, 1000, 1e7);
   paths.validate();
   choice.validate();
 }
@@ -58,7 +59,7 @@ struct Work {
 std::vector<Work> work_of(const RepeatAnalysis& analysis, const FrameTable& table, const RepeatOptions& options) {
   std::vector<Work> out;
   for (int group = 0; group < analysis.grouping.groups; ++group) {
-    for (TablePart& part : table_parts(analysis.grouping.ranges(group, table), table.rate_hz, options)) {
+    for (TablePart& part : table_parts(analysis.grouping.ranges(group, table), table, options)) {
       out.push_back({group, std::move(part), {}});
     }
   }
@@ -93,11 +94,12 @@ std::vector<RepeatClip> merged(std::vector<Work>& work) {
 
 }  // namespace
 
-RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& options) {
+RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& options, const Progress& progress) {
   options.validate();
   table.validate();
   RepeatAnalysis out;
   out.grouping = group_segments(table, behaviour_segments(table, options.segmentation), options.grouping);
+  progress.check_stop();
   out.spaces.resize(static_cast<std::size_t>(out.grouping.groups));
   tbb::parallel_for(std::size_t{0}, out.spaces.size(), [&](std::size_t group) {
     const std::vector<FrameSpan> ranges = out.grouping.ranges(static_cast<int>(group), table);
@@ -107,6 +109,7 @@ RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& opt
   std::vector<Work> work = work_of(out, table, options);
   std::size_t next = 0;
   const auto draw = [&](tbb::flow_control& control) -> Work* {
+    progress.check_stop();
     if (next < work.size()) return &work[next++];
     control.stop();
     return nullptr;

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/progress.h"
 #include "codecs/rma/frame_table.h"
 #include "codecs/rma/group_space.h"
 #include "codecs/rma/grouping.h"
@@ -28,6 +29,10 @@ struct RepeatOptions {
   double variance = 0.95;     // 0.5 to 1: share of a group's variance that its space keeps (the paper: 0.95, 0.98)
   double table_rate_hz = 15;  // 1 to 1000: the self-distance table is computed at this rate, or at the clips' if lower
   int table_frames = 16'000;  // 100 to 200 000: a larger table is computed at a lower rate still
+  // 1000 to 1e7: of a clip with more frames in a group, each table holds so many at most, one after another, and no
+  // repetition is seen from one to the next. So that a clip that is ten times as long takes ten times the work: a table
+  // of all of it would take a hundred times. Over one and a half minutes at 120 Hz.
+  int clip_frames = 12'000;
   PathOptions paths = {};
   ChoiceOptions choice = {};
   bool find_repeats = true;  // false: every clip is unique, one for each range of a group (what repetition gains)
@@ -57,6 +62,7 @@ struct RepeatAnalysis {
 };
 
 // Throws Error{bad_input} when a value of the table is not finite, Error{usage} for options out of range.
-[[nodiscard]] RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& options = {});
+[[nodiscard]] RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& options = {},
+                                             const Progress& progress = {});
 
 }  // namespace kinespace

@@ -16,8 +16,9 @@ struct TablePart {
 };
 
 // A group too large for one table at `table_rate_hz` gets one at half that rate; one that is too large still, several
-// tables of about equal size, between which no repetition is seen.
-[[nodiscard]] std::vector<TablePart> table_parts(std::span<const FrameSpan> ranges, double rate_hz,
+// tables of about equal size, between which no repetition is seen. A clip of more than `clip_frames` frames in the
+// group has tables of its own, of at most that many frames each.
+[[nodiscard]] std::vector<TablePart> table_parts(std::span<const FrameSpan> ranges, const FrameTable& table,
                                                  const RepeatOptions& options);
 
 }  // namespace kinespace

@@ -62,6 +62,12 @@ bool catches(pid_t child, int signal) {
   return false;
 }
 
+// Left to be waited for all the same.
+bool has_ended(pid_t child) {
+  siginfo_t info{};
+  return ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == child;
+}
+
 }  // namespace
 
 Command::Command(const std::vector<std::string>& arguments, const CommandOptions& options) {
@@ -106,8 +112,8 @@ Command::~Command() {
 }
 
 void Command::send(int signal) const {
-  for (int tries = 0; !catches(child_, signal); ++tries) {
-    if (tries > 10'000) throw std::runtime_error("the command never caught the signal");
+  while (!catches(child_, signal)) {
+    if (has_ended(child_)) throw std::runtime_error("the command ended before it caught the signal");
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   require(::kill(child_, signal) == 0 ? 0 : errno, "kill");

@@ -1,6 +1,5 @@
 // What the parts of mesh/ promise, on the sequences of the shared data.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include <gtest/gtest.h>

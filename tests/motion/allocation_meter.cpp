@@ -10,10 +10,15 @@ namespace {
 
 std::atomic<std::size_t> in_use{0};
 std::atomic<std::size_t> peak{0};
+std::atomic<std::size_t> all{0};
+std::atomic<std::size_t> handed_out{0};
 
 void* counted(void* memory) {
   if (memory == nullptr) throw std::bad_alloc();
-  const std::size_t now = in_use += malloc_usable_size(memory);
+  const std::size_t size = malloc_usable_size(memory);
+  all += size;
+  ++handed_out;
+  const std::size_t now = in_use += size;
   std::size_t most = peak.load();
   while (now > most && !peak.compare_exchange_weak(most, now)) {
   }
@@ -50,12 +55,20 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
 
 namespace kinespace::test {
 
-AllocationMeter::AllocationMeter() : start_(in_use) {
+AllocationMeter::AllocationMeter() : start_(in_use), start_bytes_(all), start_pieces_(handed_out) {
   peak = start_;
 }
 
 std::size_t AllocationMeter::peak_bytes() const {
   return peak - start_;
+}
+
+std::size_t AllocationMeter::all_bytes() const {
+  return all - start_bytes_;
+}
+
+std::size_t AllocationMeter::pieces() const {
+  return handed_out - start_pieces_;
 }
 
 }  // namespace kinespace::test

@@ -1,10 +1,9 @@
-// A build that is killed (SIGKILL) at random moments: the old library stays, the imports that were committed stay.
+// A build that is killed (SIGKILL) at any of its changes to the disk: the old library stays, the imports that were
+// committed stay.
 #include <atomic>
-#include <chrono>
 #include <csignal>
 #include <new>
 #include <random>
-#include <thread>
 
 #include <gtest/gtest.h>
 #include <sys/mman.h>
@@ -13,6 +12,7 @@
 
 #include "base/error.h"
 #include "storage/library_build.h"
+#include "tests/storage/disk_meter.h"
 #include "tests/storage/sample_library.h"
 #include "tests/support/data.h"
 
@@ -57,12 +57,13 @@ void build(const std::filesystem::path& target, const char* fingerprint, std::at
   build.finish();
 }
 
-// Starts a build and kills it after so many microseconds. Returns whether it had finished before.
-bool killed_build(const std::filesystem::path& target, const char* fingerprint, int microseconds,
+// A build that is killed at its so many-th change. Returns whether it had finished before.
+bool killed_build(const std::filesystem::path& target, const char* fingerprint, std::int64_t change,
                   std::atomic<int>& committed) {
   const pid_t child = ::fork();
   if (child == 0) {
     try {
+      test::die_at_change(change);
       build(target, fingerprint, committed);
     } catch (const Error& error) {
       std::fprintf(stderr, "%s\n", error.what());
@@ -70,8 +71,6 @@ bool killed_build(const std::filesystem::path& target, const char* fingerprint, 
     }
     ::_exit(0);
   }
-  std::this_thread::sleep_for(std::chrono::microseconds(microseconds));
-  ::kill(child, SIGKILL);
   int status = 0;
   ::waitpid(child, &status, 0);
   EXPECT_TRUE(WIFSIGNALED(status) || WEXITSTATUS(status) == 0) << "the build failed by itself";
@@ -91,11 +90,11 @@ class LibraryKill : public testing::Test {
   Shared shared_;
 };
 
-TEST_F(LibraryKill, at_random_moments_leaves_the_old_library_or_the_new_one_and_imports_to_resume) {
+TEST_F(LibraryKill, at_random_changes_leaves_the_old_library_or_the_new_one_and_imports_to_resume) {
   std::atomic<int>& committed = shared_.committed();
-  const auto start = std::chrono::steady_clock::now();
-  build(folder_ / "timed.kspace", "timed", committed);
-  const auto whole = std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - start);
+  const test::DiskMeter disk;
+  build(folder_ / "whole.kspace", "whole", committed);
+  const std::int64_t whole = disk.changes();
 
   std::mt19937 random(3);
   int kills = 0;
@@ -105,8 +104,8 @@ TEST_F(LibraryKill, at_random_moments_leaves_the_old_library_or_the_new_one_and_
     committed = 0;
     // A fingerprint of its own every fifth round: from the start again, over what the last one left.
     fingerprint = "round " + std::to_string(round / 5);
-    const auto moment = std::uniform_int_distribution<int>(0, static_cast<int>(whole.count()))(random);
-    const bool finished = killed_build(target_, fingerprint.c_str(), moment, committed);
+    const auto change = std::uniform_int_distribution<std::int64_t>(1, whole)(random);
+    const bool finished = killed_build(target_, fingerprint.c_str(), change, committed);
     kills += finished ? 0 : 1;
 
     const int found = test::expect_sample(Library::open_read_only(target_));
@@ -124,7 +123,7 @@ TEST_F(LibraryKill, at_random_moments_leaves_the_old_library_or_the_new_one_and_
     kills_with_imports += next.resumed_imports() > 0 ? 1 : 0;
   }
   EXPECT_EQ(kills, 20);
-  EXPECT_GE(kills_with_imports, 5) << "the moments did not fall into the build";
+  EXPECT_GE(kills_with_imports, 5) << "the changes did not fall into the build";
 
   build(target_, fingerprint.c_str(), committed);
   EXPECT_EQ(test::expect_sample(Library::open_read_only(target_)), clips);
