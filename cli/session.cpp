@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <system_error>
 
+#include <unistd.h>
+
 #include "cli/output.h"
 
 namespace kinespace::cli {
@@ -17,6 +19,13 @@ static_assert(std::atomic<int>::is_always_lock_free);
 
 void remember(int signal) {
   caught_signal.store(signal, std::memory_order_relaxed);
+}
+
+// Only what a signal handler may call.
+void leave(int signal) {
+  constexpr std::string_view text = "kinespace: stopped; nothing half-written is left\n";
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
+  ::_exit(128 + signal);
 }
 
 }  // namespace
@@ -39,7 +48,7 @@ void catch_stop_signals() {
 void stop_at_once() {
   for (const int signal : {SIGINT, SIGTERM}) {
     struct sigaction present {};
-    if (::sigaction(signal, nullptr, &present) == 0 && present.sa_handler == remember) ::signal(signal, SIG_DFL);
+    if (::sigaction(signal, nullptr, &present) == 0 && present.sa_handler == remember) ::signal(signal, leave);
   }
 }
 

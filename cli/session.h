@@ -14,7 +14,8 @@ namespace kinespace::cli {
 // From here on Ctrl-C (SIGINT) and SIGTERM only leave a mark, which the work polls; the second one ends the process at
 // once.
 void catch_stop_signals();
-// For work that has nothing half-written to take back: from here on a signal ends the program.
+// For work that has nothing half-written to take back: from here on a signal ends the program at once, with the exit
+// code and message that the work itself would end with.
 void stop_at_once();
 // The signal that came, 0 while none did.
 [[nodiscard]] int stop_signal() noexcept;
