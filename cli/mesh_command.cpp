@@ -73,11 +73,14 @@ MeshReadOptions reading(const std::optional<double>& megabytes, Session& session
   return out;
 }
 
-// For what comes before the first byte is written: a signal then ends the program, however long a step takes. A library
-// is written to at any time.
+// For what comes before the first byte is written: a signal then ends the program, however long a step takes. With a
+// library, which is written to at any time, it is only marked.
 void stop_at_once_unless(const std::optional<fs::path>& library) {
-  if (library) return;
-  stop_at_once();
+  if (library) {
+    catch_stop_signals();
+  } else {
+    stop_at_once();
+  }
   Session::check_stop();
 }
 
@@ -127,6 +130,7 @@ struct MeshEncodeOptions {
 };
 
 void run_encode(MeshEncodeOptions& options, Session& session) {
+  stop_at_once_unless({});
   MeshReadOptions read = reading(options.max_memory, session);
   read.rate_hz = options.rate_hz;
   const MeshSequence mesh = read_mesh_sequence(options.input, read);

@@ -17,6 +17,8 @@
 #include <pthread.h>
 #include <unistd.h>
 
+#include <unistd.h>
+
 #include "cli/output.h"
 #include "motion/plausibility.h"
 
@@ -87,6 +89,13 @@ void* watch(void* /*unused*/) {
   return nullptr;
 }
 
+// Only what a signal handler may call.
+void leave(int signal) {
+  constexpr std::string_view text = "kinespace: stopped; nothing half-written is left\n";
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, text.data(), text.size());
+  ::_exit(128 + signal);
+}
+
 }  // namespace
 
 void catch_stop_signals() {
@@ -133,7 +142,7 @@ Session::~Session() {
 void stop_at_once() {
   for (const int signal : {SIGINT, SIGTERM}) {
     struct sigaction present {};
-    if (::sigaction(signal, nullptr, &present) == 0 && present.sa_handler == remember) ::signal(signal, SIG_DFL);
+    if (::sigaction(signal, nullptr, &present) == 0 && present.sa_handler == remember) ::signal(signal, leave);
   }
 }
 

@@ -20,7 +20,8 @@ class Session;
 // And work that does not poll in time is ended: half a second after a signal, wherever it is, the files that it was
 // about to put in their places are removed and the process ends as if it had polled. Until the session ends.
 void end_when_stopped(const Session& session);
-// For work that has nothing half-written to take back: from here on a signal ends the program.
+// For work that has nothing half-written to take back: from here on a signal ends the program at once, with the exit
+// code and message that the work itself would end with.
 void stop_at_once();
 // The signal that came, 0 while none did.
 [[nodiscard]] int stop_signal() noexcept;

@@ -93,7 +93,7 @@ class AmcParser {
       const int row = frame % block_.rows();
       if (row + 1 == block_.rows() || frame + 1 == clip_.frames) store(frame - row, row + 1);
     }
-    for (auto& translation : translations_) std::move(translation).finish(clip_);
+    finish_translations(std::move(translations_), clip_);
     return std::move(clip_);
   }
 

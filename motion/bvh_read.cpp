@@ -106,7 +106,7 @@ class MotionParser {
     }
     skip_space();
     if (at_ != source_.end()) fail_count(frames_ + count_lines());
-    for (auto& translation : translations_) std::move(translation).finish(clip_);
+    finish_translations(std::move(translations_), clip_);
     return std::move(clip_);
   }
 

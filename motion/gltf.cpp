@@ -15,6 +15,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "motion/motion_builder.h"
 #include "motion/text.h"
 
 namespace kinespace {
@@ -69,9 +70,11 @@ class BoneMesh {
         continue;
       }
       const auto parent = static_cast<std::size_t>(joints[j].parent);
-      rest_[j] = rest_[parent] + joints[j].offset;
-      // A joint that travels is not at the end of a bone.
-      if (clip.translation_track(static_cast<int>(j)) == nullptr) add(parent, joints[j].offset);
+      // A joint that travels is not at the end of a bone; one whose track says the same thing all the time is.
+      const auto* track = clip.translation_track(static_cast<int>(j));
+      const Eigen::Vector3d bone = track != nullptr ? track->values.front() : joints[j].offset;
+      rest_[j] = rest_[parent] + bone;
+      if (track == nullptr || is_still(*track)) add(parent, bone);
     }
     for (std::size_t j = 0; j < joints.size(); ++j) {
       if (joints[j].end_site) add(j, *joints[j].end_site);
@@ -85,6 +88,15 @@ class BoneMesh {
   [[nodiscard]] std::span<const std::size_t> joint_of() const { return joint_of_; }  // by vertex
 
  private:
+  static bool is_still(const Clip::TranslationTrack& track) {
+    Eigen::Vector3d low = track.values.front(), high = low;
+    for (const Eigen::Vector3d& value : track.values) {
+      low = low.cwiseMin(value);
+      high = high.cwiseMax(value);
+    }
+    return (high - low).maxCoeff() <= still_cm;
+  }
+
   static constexpr double shortest = 0.5;  // cm: shorter bones would be specks
 
   void add(std::size_t joint, const Eigen::Vector3d& bone) {

@@ -32,18 +32,20 @@ PackedKeyMesh packed_frame(const MeshSequence& mesh, const std::vector<Triangle>
 }
 
 // Bytes of some frames, for all.
-double estimated_bytes(const MeshSequence& mesh, const std::vector<Triangle>& triangles, const Grid& grid) {
+double estimated_bytes(const MeshSequence& mesh, const std::vector<Triangle>& triangles, const Grid& grid,
+                       const Progress& progress) {
   const int tried = std::min(mesh.frames, 3);
   double sum = 0;
   for (int i = 0; i < tried; ++i) {
+    progress.check_stop();
     sum += static_cast<double>(packed_frame(mesh, triangles, grid, i * mesh.frames / tried).surface.size());
   }
   return sum / tried * mesh.frames;
 }
 
-double error_on(const MeshSequence& mesh, const Grid& grid) {
+double error_on(const MeshSequence& mesh, const Grid& grid, const Progress& progress) {
   return measured(
-             mesh, [&](int f) { return grid.points(grid.quantised(frame_points(mesh, f))); }, false)
+             mesh, [&](int f) { return grid.points(grid.quantised(frame_points(mesh, f))); }, false, progress)
       .kg;
 }
 
@@ -58,7 +60,7 @@ Bytes stream_on(const MeshSequence& mesh, const std::vector<Triangle>& triangles
                       [&](int f) { frames[static_cast<std::size_t>(f)] = packed_frame(mesh, triangles, grid, f); });
   }
   const MeshError error = measured(
-      mesh, [&](int f) { return grid.points(grid.quantised(frame_points(mesh, f))); }, true);
+      mesh, [&](int f) { return grid.points(grid.quantised(frame_points(mesh, f))); }, true, progress);
   KeyMesh flat{.vertices = mesh.vertices, .triangles = triangles, .keys = {}};
   flat.keys.emplace_back(static_cast<std::size_t>(mesh.vertices));
   const PackedKeyMesh joined = pack_key_mesh(flat);
@@ -123,7 +125,7 @@ Bytes encode_draco_frames(const MeshSequence& mesh, const MeshCodecOptions& opti
   if (options.bytes) {
     const auto inverse = [&](double fineness) {
       grid.step = 1 / fineness;
-      return estimated_bytes(mesh, triangles, grid);
+      return estimated_bytes(mesh, triangles, grid, options.progress);
     };
     const double room = 0.99 * static_cast<double>(*options.bytes) - 30.0 * mesh.frames -
                         static_cast<double>(packed_frame(mesh, triangles, grid, 0).order.size());
@@ -132,7 +134,7 @@ Bytes encode_draco_frames(const MeshSequence& mesh, const MeshCodecOptions& opti
   } else {
     const auto error = [&](double at) {
       grid.step = at;
-      return error_on(mesh, grid);
+      return error_on(mesh, grid, options.progress);
     };
     step = largest_step(size / 500, least, options.kg.value_or(0.5), 0.01, 14, error);
   }

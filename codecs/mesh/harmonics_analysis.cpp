@@ -18,8 +18,10 @@ HarmonicsAnalysis::HarmonicsAnalysis(const MeshSequence& mesh, const std::option
   setup_.functions = settings.functions;
   setup_.rotate = settings.rotate;
   setup_.size = diagonal(mesh);
+  progress_.check_stop();
   progress_.at("basis", 0);
   align();
+  progress_.check_stop();
   pack_key();
   progress_.check_stop();
   find_coefficients();

@@ -1,5 +1,6 @@
 #include "codecs/mesh/measured_mesh.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -7,9 +8,14 @@
 
 namespace kinespace {
 
-MeshError measured(const MeshSequence& mesh, const std::function<Points(int)>& frame, bool rigidity) {
+MeshError measured(const MeshSequence& mesh, const std::function<Points(int)>& frame, bool rigidity,
+                   const Progress& progress) {
   MeshSequence decoded = mesh;
-  tbb::parallel_for(0, mesh.frames, [&](int f) { set_frame(decoded, f, frame(f)); });
+  constexpr int together = 16;
+  for (int from = 0; from < mesh.frames; from += together) {
+    progress.check_stop();
+    tbb::parallel_for(from, std::min(from + together, mesh.frames), [&](int f) { set_frame(decoded, f, frame(f)); });
+  }
   return rigidity ? compare(mesh, decoded) : compare_positions(mesh, decoded);
 }
 

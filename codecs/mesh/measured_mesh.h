@@ -4,13 +4,15 @@
 #include <cstdint>
 #include <functional>
 
+#include "base/progress.h"
 #include "mesh/mesh_error.h"
 #include "storage/bitstream.h"
 
 namespace kinespace {
 
-// The error of frames that a decoder gives; `rigidity`: with lr, which takes longer.
-[[nodiscard]] MeshError measured(const MeshSequence& mesh, const std::function<Points(int)>& frame, bool rigidity);
+// The error of frames that a decoder gives, a few at a time; `rigidity`: with lr, which takes longer.
+[[nodiscard]] MeshError measured(const MeshSequence& mesh, const std::function<Points(int)>& frame, bool rigidity,
+                                 const Progress& progress);
 
 // Options kg, kg_time, lr (each only where it is a number: nothing moves in a single frame) and connectivity (bytes).
 void set_measured(BitstreamWriter& out, const MeshError& error, std::int64_t connectivity);

@@ -81,7 +81,7 @@ class Encoder {
     PaperFrames frames = frames_;
     for (std::size_t j = 0; j < members_.size(); ++j) set_rows(frames, j, attempt.parts[j].decoded);
     const MeshError error = measured(
-        mesh_, [&](int f) { return frames.frame(f); }, true);
+        mesh_, [&](int f) { return frames.frame(f); }, true, progress_);
     PaperSetup setup = setup_;
     setup.step = step;
     ByteWriter header;

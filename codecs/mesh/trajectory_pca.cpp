@@ -52,6 +52,8 @@ class Coder {
     for (int b = 0; b < split_.count(); ++b) {
       const int frames = split_.size(b);
       Eigen::MatrixXd& table = tables_.emplace_back(mesh.vertices, 3 * std::int64_t{frames});
+      progress.check_stop();
+      progress.at("components", static_cast<double>(b) / split_.count());
       for (int f = 0; f < frames; ++f) {
         const Points x = frame_points(mesh, split_.first(b) + f);
         for (int d = 0; d < 3; ++d) table.col(std::int64_t{d} * frames + f) = x.col(d);
@@ -69,7 +71,10 @@ class Coder {
   [[nodiscard]] Result code(double step, double tail, bool rigidity) const {
     progress_.check_stop();
     std::vector<Block> blocks;
-    for (int b = 0; b < split_.count(); ++b) blocks.push_back(code_block(b, step, tail / split_.count()));
+    for (int b = 0; b < split_.count(); ++b) {
+      progress_.check_stop();
+      blocks.push_back(code_block(b, step, tail / split_.count()));
+    }
     const MeshError error = measured(
         mesh_,
         [&](int f) {
@@ -77,7 +82,7 @@ class Coder {
           return frame_of(blocks[static_cast<std::size_t>(b)], f - split_.first(b), split_.size(b), mesh_.vertices,
                           step);
         },
-        rigidity);
+        rigidity, progress_);
     return {.stream = stream_of(blocks, step, error), .kg = error.kg};
   }
 

@@ -267,5 +267,39 @@ TEST(Bvh, files_are_written_whole_or_not_at_all) {
   EXPECT_THROW(write_bvh(folder / "no" / "such.bvh", clip), Error);
 }
 
+// Two joints with six channels each, in a skeleton of that many units; the second's Y goes up and down by `size`.
+std::string shaken_bvh(double reach, double size) {
+  std::string out =
+      "HIERARCHY\nROOT a\n{\n OFFSET 0 0 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation "
+      "Yrotation\n JOINT b\n {\n OFFSET 0 " +
+      std::to_string(reach) +
+      " 0\n CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n End Site\n {\n "
+      "OFFSET 0 1 0\n }\n }\n}\nMOTION\nFrames: 4\nFrame Time: 0.01\n";
+  for (int f = 0; f < 4; ++f) {
+    char line[200];
+    std::snprintf(line, sizeof line, "%d 0 0 0 0 0  0 %.15f 0 0 0 0\n", f, reach + (f % 2 == 0 ? size : -size));
+    out += line;
+  }
+  return out;
+}
+
+TEST(Bvh, a_joint_that_moves_by_rounding_keeps_its_offset) {
+  for (const double size : {0.0, 1e-12, 1e-6, 0.004}) {
+    const Clip clip = parse_bvh(shaken_bvh(120, size), "x.bvh");
+    EXPECT_EQ(clip.translation_track(1), nullptr) << size;
+    EXPECT_EQ(clip.skeleton.joints[1].offset.y(), 120) << size;
+    ASSERT_NE(clip.translation_track(0), nullptr);
+  }
+  const Clip clip = parse_bvh(shaken_bvh(120, 0.02), "x.bvh");
+  ASSERT_NE(clip.translation_track(1), nullptr);
+  EXPECT_EQ(clip.translation_track(1)->values[1].y(), 119.98);
+}
+
+// A person of 1.2 units: what moves by 0.004 of them moves by centimetres.
+TEST(Bvh, what_is_rounding_goes_with_the_size_of_the_skeleton) {
+  EXPECT_NE(parse_bvh(shaken_bvh(1.2, 0.004), "x.bvh").translation_track(1), nullptr);
+  EXPECT_EQ(parse_bvh(shaken_bvh(1.2, 1e-6), "x.bvh").translation_track(1), nullptr);
+}
+
 }  // namespace
 }  // namespace kinespace::test

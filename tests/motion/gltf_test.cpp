@@ -151,6 +151,39 @@ TEST(Gltf, a_joint_that_rests_has_no_sampler) {
   EXPECT_EQ(glb.root["animations"][0]["channels"].size(), 5u + 2u);  // 5 of 7 joints turn, 2 travel
 }
 
+// The octahedra of the picture.
+std::size_t bones_of(const Clip& clip) {
+  const Glb glb(format_gltf(clip, GltfForm::binary));
+  return glb.floats(glb.root["meshes"][0]["primitives"][0]["attributes"]["POSITION"]).size() / 18;
+}
+
+TEST(Gltf, a_track_of_rounding_does_not_take_a_bone_away) {
+  Clip clip = random_clip(4, 10);
+  clip.translations.clear();
+  const std::size_t all = bones_of(clip);
+  for (const double size : {1e-12, 1e-3, 0.009}) {
+    Clip shaken = clip;
+    for (int j = 1; j < clip.skeleton.joint_count(); ++j) {
+      auto& values = shaken.require_translation_track(j).values;
+      for (std::size_t f = 0; f < values.size(); f += 2) values[f].y() += size;
+    }
+    EXPECT_EQ(bones_of(shaken), all) << size;
+  }
+  clip.require_translation_track(2).values[3].y() += 1;
+  EXPECT_EQ(bones_of(clip), all - 1);
+}
+
+TEST(Gltf, the_bones_of_a_real_clip_are_all_there) {
+  KINESPACE_REQUIRE_FOLDER(data, data_folder);
+  for (const char* name : {"dash_active_001.bvh", "walk_normal_002.bvh", "run_childish_001.bvh"}) {
+    const Clip clip = read_clip(data / "bandai1" / name);
+    // The hips travel at the end of a root that stays. Every other joint is at the end of a bone, and the end sites.
+    const auto ends = std::ranges::count_if(clip.skeleton.joints,
+                                            [](const Joint& j) { return j.end_site && j.end_site->norm() >= 0.5; });
+    EXPECT_EQ(bones_of(clip), static_cast<std::size_t>(clip.skeleton.joint_count() - 2 + ends)) << name;
+  }
+}
+
 TEST(Gltf, both_forms_hold_the_same) {
   const Clip clip = random_clip(5, 7);
   const json text = json::parse(format_gltf(clip, GltfForm::text));
