@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -51,21 +52,24 @@ std::filesystem::path skeleton_of(const std::filesystem::path& amc) {
                                      .remedy = "put the .asf file beside it or name it"});
 }
 
-[[noreturn]] void fail_ending(ErrorKind kind, const std::filesystem::path& path, const std::string& expected) {
-  const std::string ending = path.extension().string();
+// What is there in place of a motion file, and what to do about it.
+std::pair<std::string, std::string> in_its_place(ErrorKind kind, const std::filesystem::path& path) {
   std::error_code ignored;
-  const bool folder = std::filesystem::is_directory(path, ignored);
-  const bool gltf = kind == ErrorKind::bad_input && (has_ending(path, ".glb") || has_ending(path, ".gltf"));
-  throw Error(kind, {.file = path.string(),
-                     .found = folder           ? "a folder"
-                              : gltf           ? "a glTF file, which is written only"
-                              : ending.empty() ? "no ending"
-                                               : "the ending \"" + ending + "\"",
-                     .expected = expected,
-                     .remedy = folder                     ? "name a file in it"
-                               : has_ending(path, ".asf") ? "name the .amc file; its .asf is found"
-                               : gltf                     ? "give the clip that it was made of"
-                                                          : ""});
+  if (std::filesystem::is_directory(path, ignored)) return {"a folder", "name a file in it"};
+  const bool input = kind == ErrorKind::bad_input;
+  if (input && !std::filesystem::exists(path, ignored)) return {"no such file", "check the path"};
+  if (has_ending(path, ".asf")) return {"the ending \".asf\"", "name the .amc file; its .asf is found"};
+  if (input && (has_ending(path, ".glb") || has_ending(path, ".gltf"))) {
+    return {"a glTF file, which is written only", "give the clip that it was made of"};
+  }
+  const std::string ending = path.extension().string();
+  return {ending.empty() ? "no ending" : "the ending \"" + ending + "\"", ""};
+}
+
+[[noreturn]] void fail_ending(ErrorKind kind, const std::filesystem::path& path, const std::string& expected) {
+  auto [found, remedy] = in_its_place(kind, path);
+  throw Error(kind,
+              {.file = path.string(), .found = std::move(found), .expected = expected, .remedy = std::move(remedy)});
 }
 
 }  // namespace

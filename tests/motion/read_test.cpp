@@ -3,6 +3,7 @@
 #include <clocale>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -61,7 +62,12 @@ TEST(ReadClip, an_amc_finds_its_skeleton_beside_it) {
 TEST(ReadClip, what_it_cannot_read_is_a_clear_error) {
   const TemporaryFolder folder;
   const auto error = [&](const char* name) { return error_of([&] { static_cast<void>(read_clip(folder / name)); }); };
+  EXPECT_THAT(error("a.fbx").found, HasSubstr("no such file"));
+  for (const char* name : {"a.fbx", "a", "a.asf", "a.glb"}) std::ofstream(folder / name) << "x";
+  std::filesystem::create_directory(folder / "folder");
   EXPECT_THAT(error("a.fbx").found, HasSubstr("\".fbx\""));
+  EXPECT_THAT(error("a.glb").found, HasSubstr("glTF"));
+  EXPECT_THAT(error("folder").found, HasSubstr("a folder"));
   EXPECT_THAT(error("a").found, HasSubstr("no ending"));
   EXPECT_THAT(error("a.asf").remedy, HasSubstr(".amc"));
   EXPECT_THAT(error("none.bvh").found, HasSubstr("cannot open"));
