@@ -1,6 +1,9 @@
 // The mesh command as a user runs it, on a tube that bends.
+#include <chrono>
+#include <csignal>
 #include <filesystem>
 #include <memory>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -8,6 +11,7 @@
 #include "mesh/mesh_files.h"
 #include "storage/library.h"
 #include "tests/cli/run_command.h"
+#include "tests/gltf/sample_gltf.h"
 #include "tests/mesh/sample_meshes.h"
 #include "tests/support/data.h"
 
@@ -55,6 +59,56 @@ TEST_F(MeshCommand, a_sequence_goes_there_and_back_within_the_error_asked_for) {
   EXPECT_NEAR(compared["kg"], encoded["kg"], 1e-3);
   EXPECT_TRUE(std::filesystem::exists(at("tube.png")));
   EXPECT_EQ(run({"decode", at("tube.ksm"), "-o", at("part"), "--from", "3", "--to", "5"})["frames"], 3);
+}
+
+// A million frames of two triangles, from a file of a kilobyte.
+std::string long_gltf() {
+  const std::string bytes = triangle_bytes() + bytes_of<float>({0, 33'000});
+  json out = triangle_at(data_uri(bytes));
+  out["buffers"][0]["byteLength"] = bytes.size();
+  out["bufferViews"].push_back(view_of(44, 8));
+  out["accessors"].push_back(accessor_of(2, 5126, 2, "SCALAR"));
+  out["accessors"].push_back(accessor_of(0, 5126, 2, "VEC3"));
+  out["nodes"].push_back({{"mesh", 0}});
+  out["animations"] = {{{"samplers", {{{"input", 2}, {"output", 3}}}},
+                        {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}}}}};
+  return out.dump();
+}
+
+// Work of minutes, were it not stopped: what is asserted is that it is, whatever step it is in.
+TEST_F(MeshCommand, a_signal_ends_it_and_leaves_nothing) {
+  write_text(at("long.gltf"), long_gltf());
+  write_mesh_sequence(at("large"), bending_tube(20'000, 60, 1.0));
+  std::filesystem::create_directory(at("out"));
+  const std::string out = at("out") + "/x.ksm";
+  const std::vector<std::vector<std::string>> commands = {
+      {"info", at("long.gltf")},
+      {"compare", at("long.gltf"), at("long.gltf")},
+      {"encode", at("long.gltf"), "-o", out, "--codec", "mesh-draco"},
+      {"encode", at("large"), "-o", out, "--codec", "mesh-harmonics"},
+      {"encode", at("large"), "-o", out, "--codec", "mesh-harmonics", "--profile", "paper"},
+      {"encode", at("large"), "-o", out, "--codec", "mesh-pca", "--kg", "0.01"},
+      {"encode", at("large"), "-o", out, "--codec", "mesh-draco", "--kg", "0.01"}};
+  for (std::vector<std::string> arguments : commands) {
+    for (const int pause_ms : {0, 300}) {
+      SCOPED_TRACE(arguments.back());
+      std::vector<std::string> whole{"mesh"};
+      whole.insert(whole.end(), arguments.begin(), arguments.end());
+      Command command(whole);
+      std::this_thread::sleep_for(std::chrono::milliseconds(pause_ms));
+      command.send(SIGTERM);
+      const CommandResult result = command.finish();
+      EXPECT_EQ(result.code, 143) << result.err;
+      EXPECT_NE(result.err.find("stopped"), std::string::npos);
+      EXPECT_TRUE(std::filesystem::is_empty(at("out")));
+    }
+  }
+}
+
+TEST_F(MeshCommand, a_small_file_that_asks_for_much_memory_needs_leave) {
+  write_text(at("long.gltf"), long_gltf());
+  fails({"info", at("long.gltf"), "--max-memory", "1"}, 1);
+  fails({"info", at("long.gltf"), "--max-memory", "0"}, 2);
 }
 
 TEST_F(MeshCommand, a_single_frame_has_no_error_over_time) {

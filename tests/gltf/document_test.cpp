@@ -165,6 +165,19 @@ const std::map<std::string, std::function<Json(int n)>>& greedy() {
                                {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}}}}};
          return out;
        }},
+      {"frames of many nodes",
+       [](int n) {
+         const std::string times = bytes_of<float>({0, static_cast<float>(n)});
+         Json out = triangle_at(data_uri(triangle_bytes() + times));
+         out["buffers"][0]["byteLength"] = 52;
+         out["bufferViews"].push_back(view_of(44, 8));
+         out["accessors"].push_back(accessor_of(2, 5126, 2, "SCALAR"));
+         out["accessors"].push_back(accessor_of(0, 5126, 2, "VEC3"));
+         out["animations"] = {{{"samplers", {{{"input", 2}, {"output", 3}}}},
+                               {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}}}}};
+         for (int i = 0; i < 100; ++i) out["nodes"].push_back(Json::object());
+         return out;
+       }},
       {"objects",
        [](int n) {
          Json out = triangle();
@@ -193,7 +206,11 @@ TEST(GltfDocument, the_sum_of_all_that_is_decoded_stays_below_the_bound) {
   constexpr std::size_t spare = 400'000;  // error messages, the odd growing vector
   for (const auto& [name, make] : greedy()) {
     SCOPED_TRACE(name);
-    const int n = name == "joints of every part" ? 3000 : name == "skins" ? 10'000 : name == "frames" ? 30'000 : 40'000;
+    const int n = name == "joints of every part"   ? 3000
+                  : name == "skins"                ? 10'000
+                  : name == "frames"               ? 30'000
+                  : name == "frames of many nodes" ? 1000
+                                                   : 40'000;
     const std::string text = make(n).dump();
     ASSERT_LT(text.size(), 4'200'000U);
     const AllocationMeter meter;

@@ -1,6 +1,7 @@
 // Small glTF files, put together as the tests want them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <string_view>

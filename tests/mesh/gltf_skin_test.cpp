@@ -38,7 +38,8 @@ TEST(SkinnedMesh, follows_the_joints_in_every_frame) {
 
 TEST(SkinnedMesh, is_sampled_at_the_rate_asked_for) {
   const Clip clip = make_walk({}).clip;
-  const MeshSequence mesh = parse_gltf_mesh(format_gltf(clip, GltfForm::binary), "walk.glb", {.rate_hz = clip.rate_hz / 2});
+  const MeshSequence mesh =
+      parse_gltf_mesh(format_gltf(clip, GltfForm::binary), "walk.glb", {.rate_hz = clip.rate_hz / 2});
   EXPECT_NEAR(mesh.frames, (clip.frames + 1) / 2, 1);
   const MeshSequence all = parse_gltf_mesh(format_gltf(clip, GltfForm::binary), "walk.glb", {});
   EXPECT_LT((frame_points(mesh, 5) - frame_points(all, 10)).cwiseAbs().maxCoeff(), 1e-5);
