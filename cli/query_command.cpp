@@ -1,5 +1,6 @@
 #include <filesystem>
 #include <memory>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -57,10 +58,11 @@ bool is_file(const std::string& text, const Library& library) {
   return is_motion_file(text) || !library.find_clip(text);
 }
 
-std::vector<Match> nearest(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
+std::vector<Match> nearest(LibraryView& library, ClipCurves curves, const Skeleton& skeleton,
                            const QueryCommandOptions& options, const std::string& except, const Compute& compute,
                            const Progress& progress) {
-  if (!options.windows) return nearest_motions(library, curves, skeleton, options.query, except, compute, progress);
+  if (!options.windows)
+    return nearest_motions(library, std::move(curves), skeleton, options.query, except, compute, progress);
   return nearest_windows(library, curves, skeleton, options.range,
                          {.k = options.query.k, .overlapping = options.overlapping, .labels = options.query.labels},
                          {.weighted = options.query.weighted}, except);
@@ -79,10 +81,10 @@ std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options
                    .expected = "the joint names, parents and channels of its clips",
                    .remedy = "kinespace build --add --by-skeleton adds clips of another skeleton"});
     }
-    const ClipCurves curves = clip_curves(clip);
+    ClipCurves curves = clip_curves(clip);
     const Skeleton skeleton = std::move(clip.skeleton);
     clip = {};  // a long one takes as much as its curves
-    return nearest(library, curves, skeleton, options, {}, compute, progress);
+    return nearest(library, std::move(curves), skeleton, options, {}, compute, progress);
   }
   const ClipRow row = library.require_clip(options.clip);
   return nearest(library, library.curves(row), library.skeleton(row.skeleton_id), options, row.name, compute, progress);

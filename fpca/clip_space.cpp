@@ -18,12 +18,11 @@ constexpr int clips_per_visit = 64;
 
 // T x C of the whole clip, breaks and all, velocity in metres per clip.
 SampleMatrix clip_samples(const MotionSpace& space, const ClipCurves& curves) {
-  SampleMatrix values = curves.values;
-  space.apply_references(values);
   const int last = curves.frames() - 1;
   Run whole{{0, last}};
   if (last == 0) whole.cuts = {0};
-  SampleMatrix out = RunSampler(values, whole, curves.rate_hz).sample(0, last, Warp(), space.points());
+  SampleMatrix out = RunSampler(curves.values, whole, curves.rate_hz).sample(0, last, Warp(), space.points());
+  out.array().rowwise() *= space.reference_signs(curves.values).array();
   out.leftCols<3>() *= last / curves.rate_hz;
   return out;
 }

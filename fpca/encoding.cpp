@@ -14,12 +14,6 @@ namespace {
 
 constexpr int travel_curves = 3;
 
-// The frames of one decoded sequence: positions of the root in metres from the clip's start, and quaternions.
-struct DecodedSequence {
-  const EncodedSequence* encoded = nullptr;
-  SampleMatrix frames;  // [frame][curve]
-};
-
 // Integrates the velocity over own time: at grid point i, duration * integral of v(s) h'(s) ds.
 SampleMatrix integrate_travel(const SampleMatrix& samples, const Warp& warp, double duration_s) {
   const Eigen::Index points = samples.rows();
@@ -53,24 +47,18 @@ SampleMatrix decode_frames(const MotionSpace& space, const EncodedSequence& sequ
   return out;
 }
 
-void join(std::vector<DecodedSequence>& sequences, const JoinOptions& options) {
-  std::vector<CutCorrection> cuts;
-  for (std::size_t i = 0; i + 1 < sequences.size(); ++i) {
-    cuts.push_back(cut_correction(sequences[i].frames, sequences[i + 1].frames, options.free_change));
-  }
-  for (std::size_t i = 0; i < sequences.size(); ++i) {
-    SampleMatrix& frames = sequences[i].frames;
-    const auto n = static_cast<double>(frames.rows() - 1);
-    const double steepness = fade_steepness(n, options.blend);
-    for (Eigen::Index f = 0; f < frames.rows(); ++f) {
-      if (i > 0) {
-        const Fade w = fade(static_cast<double>(f) / n, options.blend);
-        frames.row(f) += -w.value * cuts[i - 1].value - (w.slope * steepness) * cuts[i - 1].slope;
-      }
-      if (i + 1 < sequences.size()) {
-        const Fade w = fade((n - static_cast<double>(f)) / n, options.blend);
-        frames.row(f) += w.value * cuts[i].value - (w.slope * steepness) * cuts[i].slope;
-      }
+// Takes out of a sequence what does not fit at the cuts before and after it; null: there is none.
+void join(SampleMatrix& frames, const CutCorrection* before, const CutCorrection* after, const JoinOptions& options) {
+  const auto n = static_cast<double>(frames.rows() - 1);
+  const double steepness = fade_steepness(n, options.blend);
+  for (Eigen::Index f = 0; f < frames.rows(); ++f) {
+    if (before != nullptr) {
+      const Fade w = fade(static_cast<double>(f) / n, options.blend);
+      frames.row(f) += -w.value * before->value - (w.slope * steepness) * before->slope;
+    }
+    if (after != nullptr) {
+      const Fade w = fade((n - static_cast<double>(f)) / n, options.blend);
+      frames.row(f) += w.value * after->value - (w.slope * steepness) * after->slope;
     }
   }
 }
@@ -98,18 +86,43 @@ int EncodedClip::sequence_count() const {
 }
 
 RunSampler::RunSampler(const SampleMatrix& values, const Run& run, double rate_hz)
-    : spline_(values.middleRows(run.cuts.front(), run.cuts.back() - run.cuts.front() + 1)),
-      start_(run.cuts.front()),
-      rate_hz_(rate_hz) {}
+    : values_(values), start_(run.cuts.front()), end_(run.cuts.back()), rate_hz_(rate_hz) {
+  constexpr int ordinary_frames = 10'000;
+  if (end_ - start_ < ordinary_frames) whole_.emplace(values.middleRows(start_, end_ - start_ + 1));
+}
+
+UniformSpline RunSampler::spline_around(int first, int last) const {
+  return UniformSpline(values_.middleRows(first, last - first + 1));
+}
+
+void RunSampler::sample_point(const UniformSpline& spline, double x, Eigen::Ref<Eigen::RowVectorXd> out) const {
+  spline.value(x, out);
+  spline.derivative(x, out.head<travel_curves>());
+  out.head<travel_curves>() *= rate_hz_;
+}
 
 SampleMatrix RunSampler::sample(int first, int last, const Warp& warp, int points) const {
-  SampleMatrix out(points, spline_.curves());
+  constexpr int margin = 40;
+  constexpr int long_stretch = 4096;  // beyond it every point has a spline of its own
+  SampleMatrix out(points, values_.cols());
+  std::optional<UniformSpline> own;
+  int own_start = start_;
+  if (!whole_ && last - first <= long_stretch) {
+    own_start = std::max(start_, first - margin);
+    own = spline_around(own_start, std::min(end_, last + margin));
+  }
   for (int i = 0; i < points; ++i) {
     const double s = static_cast<double>(i) / (points - 1);
-    const double x = first - start_ + warp.own_time(s) * (last - first);
-    spline_.value(x, out.row(i));
-    spline_.derivative(x, out.row(i).head<travel_curves>());
-    out.row(i).head<travel_curves>() *= rate_hz_;
+    const double way = warp.own_time(s) * (last - first);
+    if (whole_) {
+      sample_point(*whole_, first - start_ + way, out.row(i));
+    } else if (own) {
+      sample_point(*own, first - own_start + way, out.row(i));
+    } else {
+      const int at = first + static_cast<int>(way);
+      const int from = std::max(start_, at - margin);
+      sample_point(spline_around(from, std::min(end_, at + margin)), first - from + way, out.row(i));
+    }
   }
   return out;
 }
@@ -146,14 +159,22 @@ ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n, cons
                  .values = SampleMatrix(clip.frames, space.curves()),
                  .side_tracks = clip.side_tracks};
   for (const EncodedRun& run : clip.runs) {
-    std::vector<DecodedSequence> sequences;
+    // Two sequences at a time: positions of the root in metres from the clip's start, and quaternions.
     Eigen::Vector3d start = run.start.cast<double>();
-    for (const EncodedSequence& encoded : run.sequences) {
-      sequences.push_back({&encoded, decode_frames(space, encoded, start, clip.rate_hz, n)});
-      start += encoded.travel.cast<double>();
+    SampleMatrix next;
+    std::optional<CutCorrection> before;
+    for (std::size_t i = 0; i < run.sequences.size(); ++i) {
+      SampleMatrix frames = i == 0 ? decode_frames(space, run.sequences[i], start, clip.rate_hz, n) : std::move(next);
+      start += run.sequences[i].travel.cast<double>();
+      std::optional<CutCorrection> after;
+      if (i + 1 < run.sequences.size()) {
+        next = decode_frames(space, run.sequences[i + 1], start, clip.rate_hz, n);
+        after = cut_correction(frames, next, options.free_change);
+      }
+      join(frames, before ? &*before : nullptr, after ? &*after : nullptr, options);
+      out.values.middleRows(run.sequences[i].first, frames.rows()) = frames;
+      before = std::move(after);
     }
-    join(sequences, options);
-    for (const DecodedSequence& s : sequences) out.values.middleRows(s.encoded->first, s.frames.rows()) = s.frames;
   }
   return out;
 }

@@ -5,6 +5,7 @@
 // inside, the excess is taken out, both by corrections that fade within `blend` of a sequence.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -51,16 +52,26 @@ struct JoinOptions {
 };
 
 // The curves of a run as splines, ready to be sampled sequence by sequence.
+//
+// A run of more than 10 000 frames is not held as one spline, which would take twice the memory of its frames: for each
+// stretch that is sampled a spline is laid through it and 40 frames to both sides. A frame's weight in a spline falls
+// to 0.27 of what it was from one frame to the next, so the two agree to the last digits of a double.
 class RunSampler {
  public:
-  // `values`: all frames of the clip; the run is cut out.
+  // `values`: all frames of the clip; they must outlive the sampler.
   RunSampler(const SampleMatrix& values, const Run& run, double rate_hz);
+  RunSampler(SampleMatrix&& values, const Run& run, double rate_hz) = delete;
   // T x C at the T points of the warped sequence time: velocity in m/s, quaternions.
   [[nodiscard]] SampleMatrix sample(int first, int last, const Warp& warp, int points) const;
 
  private:
-  UniformSpline spline_;
-  int start_;
+  [[nodiscard]] UniformSpline spline_around(int first, int last) const;
+  void sample_point(const UniformSpline& spline, double x, Eigen::Ref<Eigen::RowVectorXd> out) const;
+
+  const SampleMatrix& values_;
+  std::optional<UniformSpline> whole_;  // of a run that is not long
+  int start_;                           // of the run; frames of the clip
+  int end_;                             // its last frame
   double rate_hz_;
 };
 

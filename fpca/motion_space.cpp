@@ -69,12 +69,21 @@ void MotionSpace::set_references(const Eigen::Matrix4Xd& references) {
 }
 
 void MotionSpace::apply_references(SampleMatrix& values) const {
+  const Eigen::RowVectorXd signs = reference_signs(values);
   for (int k = 0; k < layout_.joint_count(); ++k) {
-    auto q = values.middleCols(3 + 4 * k, 4);
+    if (signs(3 + 4 * k) < 0) values.middleCols(3 + 4 * k, 4) *= -1;
+  }
+}
+
+Eigen::RowVectorXd MotionSpace::reference_signs(const SampleMatrix& values) const {
+  Eigen::RowVectorXd signs = Eigen::RowVectorXd::Ones(curves());
+  for (int k = 0; k < layout_.joint_count(); ++k) {
+    const auto q = values.middleCols(3 + 4 * k, 4);
     const Eigen::RowVector4d side = references_.col(k).transpose();
     const double dot = k == 0 ? q.row(0).dot(side) : (q * side.transpose()).sum();
-    if (dot < 0) q *= -1;
+    if (dot < 0) signs.segment<4>(3 + 4 * k).setConstant(-1);
   }
+  return signs;
 }
 
 int MotionSpace::group_count() const {

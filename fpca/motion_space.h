@@ -71,6 +71,8 @@ class MotionSpace {
   [[nodiscard]] const Eigen::Matrix4Xd& references() const { return references_; }
   // Turns the quaternion curves of a clip to that side: the root by its first frame, other joints by their sum.
   void apply_references(SampleMatrix& values) const;
+  // What it multiplies each curve by: 1 or -1.
+  [[nodiscard]] Eigen::RowVectorXd reference_signs(const SampleMatrix& values) const;
 
   // One accumulator for each group, to be filled by accumulate.
   [[nodiscard]] std::vector<CurveMoments> empty_moments() const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -45,7 +46,7 @@ std::vector<Candidate> nearest_vectors(const RetrievalMatrix& matrix, const std:
 // Candidates whose features are in memory together, and what the DTW makes of them.
 class RerankBatch {
  public:
-  RerankBatch(const ClipCurves& curves, const Skeleton& skeleton, const QueryOptions& options, const Compute& compute)
+  RerankBatch(ClipCurves curves, const Skeleton& skeleton, const QueryOptions& options, const Compute& compute)
       : options_(options), compute_(compute) {
     const PoseFeatures features = pose_features(curves, skeleton);
     query_ = {curves.frames(), features.rows};
@@ -94,9 +95,9 @@ class RerankBatch {
   std::vector<Candidate*> waiting_;
 };
 
-void rerank(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton, const QueryOptions& options,
+void rerank(LibraryView& library, ClipCurves curves, const Skeleton& skeleton, const QueryOptions& options,
             const Compute& compute, const Progress& progress, std::vector<Candidate>& candidates) {
-  RerankBatch batch(curves, skeleton, options, compute);
+  RerankBatch batch(std::move(curves), skeleton, options, compute);
   for (Candidate& candidate : candidates) {
     progress.check_stop();
     const ClipRow row = library.library().clip(candidate.clip_id);
@@ -133,7 +134,7 @@ double rerank_band(double band, const RerankClip& a, const RerankClip& b) {
   return std::min(band, std::max(most_cells / (2 * std::max(all_cells, 1.0)), least));
 }
 
-std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curves, const Skeleton& skeleton,
+std::vector<Match> nearest_motions(LibraryView& library, ClipCurves curves, const Skeleton& skeleton,
                                    const QueryOptions& options, const std::string& except, const Compute& compute,
                                    const Progress& progress) {
   options.validate();
@@ -152,7 +153,7 @@ std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curve
   const std::size_t keep = options.rerank ? std::max(wanted, static_cast<std::size_t>(options.candidates)) : wanted;
   const std::vector<ClipRow> rows = library.library().clips();
   std::vector<Candidate> found = nearest_vectors(matrix, query, weights, rows, options, except, keep);
-  if (options.rerank) rerank(library, curves, skeleton, options, compute, progress, found);
+  if (options.rerank) rerank(library, std::move(curves), skeleton, options, compute, progress, found);
   found.resize(std::min(found.size(), wanted));
 
   std::vector<Match> out;

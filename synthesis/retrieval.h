@@ -51,10 +51,10 @@ struct Match {
 [[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const Clip& clip,
                                                  const QueryOptions& options = {}, const std::string& except = {},
                                                  const Compute& compute = {}, const Progress& progress = {});
-// The same for curves of a skeleton, as LibraryView::curves gives them.
-[[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, const ClipCurves& curves,
-                                                 const Skeleton& skeleton, const QueryOptions& options = {},
-                                                 const std::string& except = {}, const Compute& compute = {},
-                                                 const Progress& progress = {});
+// The same for curves of a skeleton, as LibraryView::curves gives them; moved in, those of a long clip do not stay in
+// memory beside those of the library's.
+[[nodiscard]] std::vector<Match> nearest_motions(LibraryView& library, ClipCurves curves, const Skeleton& skeleton,
+                                                 const QueryOptions& options = {}, const std::string& except = {},
+                                                 const Compute& compute = {}, const Progress& progress = {});
 
 }  // namespace kinespace

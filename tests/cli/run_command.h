@@ -34,6 +34,7 @@ class Command {
   // Waits until the command has its own handler for the signal, then sends it.
   void send(int signal) const;
   [[nodiscard]] CommandResult finish();
+  [[nodiscard]] pid_t id() const { return child_; }
 
  private:
   std::filesystem::path folder_;

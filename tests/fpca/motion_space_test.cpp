@@ -238,5 +238,32 @@ TEST(SpaceCodec, flipped_bytes_are_errors_or_valid_clips) {
   }
 }
 
+// One spline over the whole run, which is what a long run's parts stand for.
+SampleMatrix sampled_from_one_spline(const SampleMatrix& values, double rate_hz, int first, int last, int points) {
+  const UniformSpline spline(values);
+  SampleMatrix out(points, values.cols());
+  for (int i = 0; i < points; ++i) {
+    const double x = first + Warp().own_time(static_cast<double>(i) / (points - 1)) * (last - first);
+    spline.value(x, out.row(i));
+    spline.derivative(x, out.row(i).head<3>());
+    out.row(i).head<3>() *= rate_hz;
+  }
+  return out;
+}
+
+TEST(RunSampler, samples_a_long_run_as_one_spline_would) {
+  constexpr int frames = 12'000;
+  SampleMatrix values(frames, 7);
+  for (int f = 0; f < frames; ++f) {
+    for (int c = 0; c < 7; ++c) values(f, c) = std::sin(0.01 * (c + 1) * f) + ((7 * f + c) % 11) * 0.1;
+  }
+  const RunSampler sampler(values, Run{{0, frames - 1}}, 120);
+  for (const auto& [first, last] :
+       {std::pair(0, 110), {5, 130}, {6000, 6100}, {frames - 120, frames - 1}, {0, frames - 1}}) {
+    const SampleMatrix wanted = sampled_from_one_spline(values, 120, first, last, 64);
+    EXPECT_LT((sampler.sample(first, last, Warp(), 64) - wanted).cwiseAbs().maxCoeff(), 1e-9) << first << " " << last;
+  }
+}
+
 }  // namespace
 }  // namespace kinespace

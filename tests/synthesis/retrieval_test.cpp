@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "kernels/dtw_detail.h"
 #include "tests/synthesis/library_folder.h"
 
 namespace kinespace {
@@ -116,6 +117,31 @@ TEST_F(Retrieval, a_wrong_name_brings_the_nearest_one) {
     EXPECT_EQ(error.kind(), ErrorKind::usage);
     EXPECT_NE(std::string(error.what()).find('"' + name + '"'), std::string::npos);
   }
+}
+
+// Keyframes are taken at 30 Hz.
+double rerank_cells(int frames, double rate_hz) {
+  const RerankClip clip{frames, static_cast<int>(frames * 30 / rate_hz)};
+  const auto region = dtw_detail::region_of(clip.keyframes, clip.keyframes,
+                                            {.band_fraction = rerank_band(QueryOptions{}.band, clip, clip)});
+  double cells = 0;
+  for (int j = 0; j < clip.keyframes; ++j) cells += static_cast<double>(region.end_row(j) - region.first_row(j));
+  return cells;
+}
+
+TEST(Rerank, takes_at_most_fourteen_times_the_cells_for_clips_that_are_ten_times_as_long) {
+  for (const double rate : {30.0, 60.0, 120.0}) {
+    for (const int frames : {10'000, 50'000, 100'000}) {
+      EXPECT_LE(rerank_cells(10 * frames, rate), 14 * rerank_cells(frames, rate)) << frames << " at " << rate;
+    }
+  }
+}
+
+TEST(Rerank, leaves_the_band_of_ordinary_clips_and_of_short_partners_as_it_is) {
+  EXPECT_EQ(rerank_band(0.1, {10'000, 10'000}, {10'000, 10'000}), 0.1);
+  EXPECT_EQ(rerank_band(0.1, {100'000, 25'000}, {200, 50}), 0.1);
+  EXPECT_LT(rerank_band(0.1, {100'000, 25'000}, {100'000, 25'000}), 0.1);
+  EXPECT_GE(rerank_band(0.1, {10'000'000, 2'500'000}, {10'000'000, 2'500'000}) * 2'500'000, 99);
 }
 
 TEST(QueryOptions, out_of_range_is_refused) {
