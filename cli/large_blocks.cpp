@@ -28,8 +28,12 @@ void ask_for_large_pages(void* memory, std::size_t size) noexcept {
 }  // namespace
 
 void* operator new(std::size_t size) {
-  void* const memory = std::malloc(size == 0 ? 1 : size);
-  if (memory == nullptr) throw std::bad_alloc();
+  void* memory = nullptr;
+  while ((memory = std::malloc(size == 0 ? 1 : size)) == nullptr) {
+    const std::new_handler handler = std::get_new_handler();
+    if (handler == nullptr) throw std::bad_alloc();
+    handler();
+  }
   if (size >= large_bytes) ask_for_large_pages(memory, size);
   return memory;
 }

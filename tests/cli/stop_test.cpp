@@ -47,10 +47,12 @@ std::string repeated_bvh(const Clip& clip, int frames, const fs::path& scratch) 
 // What a process has read so far, in bytes; -1 when that cannot be told any more.
 std::int64_t bytes_read(pid_t process) {
   std::ifstream io(fmt::format("/proc/{}/io", process));
-  std::string word;
+  std::string line;
+  std::getline(io, line);  // "rchar: 1234"
+  constexpr std::string_view name = "rchar: ";
   std::int64_t value = -1;
-  if (io >> word >> value && word == "rchar:") return value;
-  return -1;
+  if (line.starts_with(name)) std::from_chars(line.data() + name.size(), line.data() + line.size(), value);
+  return value;
 }
 
 bool ended(pid_t process, int within_ms) {
