@@ -187,13 +187,15 @@ void add_papers(const BenchOptions& options, BenchReport& report) {
 void add_motion_space(const BenchOptions& options, BenchReport& report) {
   CodecData bandai{.name = "bandai2, one stream", .streams = {}};
   bandai.streams.push_back(read_folder(options.data / "bandai2"));
-  for (const CodecBar& bar : {CodecBar{0.1, 14}, CodecBar{0.35, 6.5}, CodecBar{0.5, 4.5}, CodecBar{1.0, 2.6}, CodecBar{2.4, 1.2}}) {
+  for (const CodecBar& bar :
+       {CodecBar{0.1, 14}, CodecBar{0.35, 6.5}, CodecBar{0.5, 4.5}, CodecBar{1.0, 2.6}, CodecBar{2.4, 1.2}}) {
     measure(bandai, bar, report);
   }
   measure_largest(bandai, 1, 20, report);
   CodecData cmu{.name = "cmu 01, 02, 03, a stream each", .streams = {}};
   for (const char* subject : {"01", "02", "03"}) cmu.streams.push_back(read_folder(options.data / "cmu" / subject));
-  for (const CodecBar& bar : {CodecBar{0.1, 14}, CodecBar{0.35, 7}, CodecBar{0.5, 3.6}, CodecBar{0.9, 2.2}, CodecBar{2.1, 1.15}}) {
+  for (const CodecBar& bar :
+       {CodecBar{0.1, 14}, CodecBar{0.35, 7}, CodecBar{0.5, 3.6}, CodecBar{0.9, 2.2}, CodecBar{2.1, 1.15}}) {
     measure(cmu, bar, report);
   }
   measure_largest(cmu, 1, 4, report);

@@ -8,11 +8,11 @@
 #include <limits>
 #include <numbers>
 
+#include "bench/timing.h"
 #include <cblas.h>
 #include <oneapi/tbb/global_control.h>
 
 #include "base/error.h"
-#include "bench/timing.h"
 #include "kernels/covariance.h"
 
 extern "C" void dsyevd_(const char* job, const char* half, const int* n, double* a, const int* stride, double* values,

@@ -104,7 +104,8 @@ void measure_speed(const Corpus& corpus, std::vector<BenchResult>& results) {
   for (std::size_t i = 0; i < corpus.paths.size(); ++i) {
     const Clip clip = corpus.parse(i);
     frames += clip.frames;
-    positions_s += fastest(1, [&](std::size_t) { return cpu_seconds([&] { static_cast<void>(joint_positions(clip)); }); });
+    positions_s +=
+        fastest(1, [&](std::size_t) { return cpu_seconds([&] { static_cast<void>(joint_positions(clip)); }); });
     std::string text;
     write_s += cpu_seconds([&] { text = format_bvh(clip); });
     written_mb += static_cast<double>(text.size()) / 1e6;

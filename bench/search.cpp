@@ -120,7 +120,8 @@ struct SearchPoints {
     return false;
   }
 };
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Adaptor<float, SearchPoints>, SearchPoints, -1, std::int64_t>;
+using Tree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Adaptor<float, SearchPoints>, SearchPoints, -1, std::int64_t>;
 
 void search_tree(const Tree& tree, const Windows& windows, int q) {
   std::vector<std::int64_t> ids(neighbours);

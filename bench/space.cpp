@@ -217,7 +217,8 @@ void space_rows(const BenchOptions& options, const Compute& compute, BenchReport
   const DataSet bandai = load_data_set("bandai1+bandai2", {options.data / "bandai1", options.data / "bandai2"});
   level_of_detail_rows(bandai, {1.0, 0.25, 0.06}, compute, report);
   alignment_rows(bandai, compute, report);
-  const DataSet cmu = load_data_set("cmu 01-03", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
+  const DataSet cmu =
+      load_data_set("cmu 01-03", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
   level_of_detail_rows(cmu, {0.75, 0.40, 0.10}, compute, report);
 }
 

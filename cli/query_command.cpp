@@ -94,8 +94,7 @@ void run_query(QueryCommandOptions options, Session& session) {
   options.query.rerank = !options.no_rerank;
   options.query.validate();
   LibraryView library(options.library);
-  const std::vector<Match> matches =
-      find(library, options, Compute::open(options.device), session.stops(), session);
+  const std::vector<Match> matches = find(library, options, Compute::open(options.device), session.stops(), session);
   options.json ? print_json(to_json(options.clip, matches)) : print_matches(matches);
 }
 

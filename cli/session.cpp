@@ -17,8 +17,6 @@
 #include <pthread.h>
 #include <unistd.h>
 
-#include <unistd.h>
-
 #include "cli/output.h"
 #include "motion/plausibility.h"
 

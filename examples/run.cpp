@@ -100,8 +100,9 @@ BodyPose body_at(double t, const RunOptions& options, const Gait& gait) {
                  .pitch = at_pace(4, 8, pace) * degree,
                  .roll = 3 * degree * std::cos(gait.angle(t) - pi * gait.toe_off) - bank};
   const double chest_yaw = at_pace(5, 9, pace) * degree * std::cos(cycle) * std::min(1.0, options.arm_swing);
-  pose.spine = {
-      .yaw = chest_yaw - pose.pelvis.yaw, .pitch = at_pace(3, 7, pace) * degree, .roll = -0.9 * (pose.pelvis.roll + bank)};
+  pose.spine = {.yaw = chest_yaw - pose.pelvis.yaw,
+                .pitch = at_pace(3, 7, pace) * degree,
+                .roll = -0.9 * (pose.pelvis.roll + bank)};
   pose.head = {.yaw = -chest_yaw, .pitch = -at_pace(5, 11, pace) * degree, .roll = 0.5 * bank};
   swing_arms(pose, options, cycle, pace);
   return pose;

@@ -149,7 +149,8 @@ Run cut_run(const Movement& movement, int first, int last, double rate_hz, const
 
 void SequenceOptions::validate() const {
   require_option(shortest_s > 0, "shortest_s", shortest_s, "seconds above 0");
-  require_option(longest_s > shortest_s && std::isfinite(longest_s), "longest_s", longest_s, "seconds above shortest_s");
+  require_option(longest_s > shortest_s && std::isfinite(longest_s), "longest_s", longest_s,
+                 "seconds above shortest_s");
   require_option(length_weight >= 0, "length_weight", length_weight, "0 or more");
   require_option(jerk_weight >= 0, "jerk_weight", jerk_weight, "0 or more");
   require_option(break_cm > 0, "break_cm", break_cm, "centimetres above 0");

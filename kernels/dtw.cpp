@@ -56,8 +56,9 @@ void check(const FeatureSet& queries, const FeatureSet& targets, std::span<const
   queries.validate();
   targets.validate();
   if (queries.dims != targets.dims) {
-    dtw_misuse("queries of " + std::to_string(queries.dims) + " features and targets of " + std::to_string(targets.dims),
-           "the same features");
+    dtw_misuse(
+        "queries of " + std::to_string(queries.dims) + " features and targets of " + std::to_string(targets.dims),
+        "the same features");
   }
   ClipCheck query(queries, "query");
   ClipCheck target(targets, "target");
@@ -109,7 +110,7 @@ void FeatureSet::validate() const {
   }
   if (static_cast<std::size_t>(starts.back()) * static_cast<std::size_t>(dims) != values.size()) {
     dtw_misuse(std::to_string(values.size()) + " values",
-           std::to_string(starts.back()) + " rows of " + std::to_string(dims) + " features");
+               std::to_string(starts.back()) + " rows of " + std::to_string(dims) + " features");
   }
   for (int c = 0; c < clips(); ++c) {
     if (starts[c + 1] - starts[c] > std::int64_t{1} << 30) dtw_misuse("a clip of over 2^30 rows", "shorter clips");

@@ -17,7 +17,6 @@
 namespace kinespace {
 namespace {
 
-
 struct Pair {
   int a = 0;
   int b = 0;

@@ -8,7 +8,8 @@
 namespace kinespace {
 namespace {
 
-constexpr int frame_block = 32;  // frames; the world frames of a skeleton at a block's frames stay in the second-level cache
+constexpr int frame_block =
+    32;  // frames; the world frames of a skeleton at a block's frames stay in the second-level cache
 
 // One number of one joint at the frames of a block.
 using Lane = std::array<double, frame_block>;

@@ -11,7 +11,7 @@ namespace {
 constexpr double margin_s = 0.25;
 constexpr double share = 0.99;
 // Below these nothing moves: sources that rest give ratios to them rather than to zero.
-constexpr double least_usual_speed = 5;          // cm/s
+constexpr double least_usual_speed = 5;    // cm/s
 constexpr double least_acceleration = 50;  // cm/s^2
 
 double percentile(std::vector<double>& values) {

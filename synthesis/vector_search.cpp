@@ -190,8 +190,8 @@ void VectorSearch::bound_blocks(Scratch& scratch, std::span<const std::uint8_t> 
 void VectorSearch::visit(int block, const Scratch& scratch, std::span<const std::uint8_t> allowed, Found& found) const {
   const auto b = static_cast<std::size_t>(block);
   unsigned alive = scan_block(values_.data() + b * static_cast<std::size_t>(dimensions_) * vector_lanes,
-                              rests_.data() + b * levels_.size() * vector_lanes, scratch.turned.data(), scratch.rest.data(),
-                              levels_.data(), static_cast<int>(levels_.size()), found.limit);
+                              rests_.data() + b * levels_.size() * vector_lanes, scratch.turned.data(),
+                              scratch.rest.data(), levels_.data(), static_cast<int>(levels_.size()), found.limit);
   for (int l = 0; alive != 0; ++l, alive >>= 1U) {
     if ((alive & 1U) == 0) continue;
     const std::int32_t id = ids_[b * vector_lanes + static_cast<std::size_t>(l)];

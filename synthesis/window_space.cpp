@@ -20,7 +20,7 @@ namespace {
 
 constexpr int function_windows = 4000;    // enough to find functions of time
 constexpr int component_windows = 16000;  // and components of scores
-constexpr int window_block = 512;                // windows projected at once
+constexpr int window_block = 512;         // windows projected at once
 
 // out (rows x curves) = projector (rows x samples) times in (samples x curves), sums in the order of the samples.
 KINESPACE_SIMD_BODY void project_window_body(const float* projector, std::ptrdiff_t rows, std::ptrdiff_t samples,

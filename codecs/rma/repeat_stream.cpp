@@ -175,7 +175,8 @@ void RepeatDecoder::smooth_seams(std::size_t clip, std::vector<double>& vectors)
     for (std::size_t k = 0; k < dimensions; ++k) out[k] = vectors[k * frames + static_cast<std::size_t>(frame)];
   };
   std::vector<double> frame(dimensions);
-  SeamSmoother smoother(static_cast<int>(dimensions), entry.frames, inner, seam_smoothing_s * entry.rate_hz, get, jumps);
+  SeamSmoother smoother(static_cast<int>(dimensions), entry.frames, inner, seam_smoothing_s * entry.rate_hz, get,
+                        jumps);
   for (int f = 0; f < entry.frames; ++f) {
     if (!smoother.touches(f)) continue;
     get(f, frame);

@@ -72,7 +72,8 @@ class MeshBasisCache : public testing::TestWithParam<CachedKind> {
 INSTANTIATE_TEST_SUITE_P(All, MeshBasisCache,
                          testing::Values(CachedKind{"standard", {.kg = 1.0, .bases = 60}, 1},
                                          CachedKind{"coarse", {.kg = 4.0, .bases = 40, .coarse_vertices = 200}, 1},
-                                         CachedKind{"paper", {.profile = MeshProfile::paper, .bases = 40, .clusters = 2}, 2}),
+                                         CachedKind{
+                                             "paper", {.profile = MeshProfile::paper, .bases = 40, .clusters = 2}, 2}),
                          [](const auto& kind) { return kind.param.name; });
 
 void mend_checksum(Bytes& blob) {

@@ -81,7 +81,8 @@ class MeshDamage : public testing::TestWithParam<DamagedKind> {
     return out;
   }
 };
-INSTANTIATE_TEST_SUITE_P(All, MeshDamage, testing::ValuesIn(damaged_kinds()), [](const auto& kind) { return kind.param.name; });
+INSTANTIATE_TEST_SUITE_P(All, MeshDamage, testing::ValuesIn(damaged_kinds()),
+                         [](const auto& kind) { return kind.param.name; });
 
 TEST_P(MeshDamage, every_prefix_is_an_error) {
   ASSERT_TRUE(decodes(stream()));
