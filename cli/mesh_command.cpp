@@ -113,7 +113,7 @@ Json stream_fields(const MeshStreamReader& reader) {
           {"lr", number_of(reader.stream(), "lr")}};
 }
 
-void print(const Json& result, bool json) {
+void print_result(const Json& result, bool json) {
   json ? print_json(result) : print_fields(result);
 }
 
@@ -148,7 +148,7 @@ void run_encode(MeshEncodeOptions& options, Session& session) {
   catch_stop_signals();
   write_file_atomically(options.output, std::span<const std::byte>(stream));
   result["encode_s"] = seconds;
-  print(result, options.json);
+  print_result(result, options.json);
 }
 
 struct MeshDecodeOptions {
@@ -182,15 +182,15 @@ void run_decode(const MeshDecodeOptions& options, const std::string& format, Ses
   catch_stop_signals();
   write_mesh_sequence(options.output, mesh, format_of(options.output, format), progress);
   session.finish_progress();
-  print({{"output", options.output.string()},
-         {"vertices", mesh.vertices},
-         {"triangles", mesh.triangles.size()},
-         {"frames", mesh.frames},
-         {"open_s", opened},
-         {"basis_s", reader->basis_seconds()},
-         {"basis_from_library", reader.basis_from_library()},
-         {"decode_frames_per_s", mesh.frames / seconds}},
-        options.json);
+  print_result({{"output", options.output.string()},
+                {"vertices", mesh.vertices},
+                {"triangles", mesh.triangles.size()},
+                {"frames", mesh.frames},
+                {"open_s", opened},
+                {"basis_s", reader->basis_seconds()},
+                {"basis_from_library", reader.basis_from_library()},
+                {"decode_frames_per_s", mesh.frames / seconds}},
+               options.json);
 }
 
 struct MeshCompareOptions {
@@ -254,7 +254,7 @@ void run_compare(const MeshCompareOptions& options, Session& session) {
     result["picture_frame"] = frame;
     result["picture_red"] = drawn.worst;
   }
-  print(result, options.json);
+  print_result(result, options.json);
 }
 
 struct MeshInfoOptions {
@@ -287,13 +287,13 @@ Json describe_sequence(const MeshInfoOptions& options, Session& session) {
 
 void run_info(const MeshInfoOptions& options, Session& session) {
   stop_at_once_unless({});
-  if (!is_stream_file(options.file)) return print(describe_sequence(options, session), options.json);
+  if (!is_stream_file(options.file)) return print_result(describe_sequence(options, session), options.json);
   const FileContent file(options.file);
   const auto reader = open_mesh_stream(file.bytes(), options.file.string());
   const std::string& kind = reader->stream().kind();
   Json result{{"kind", "mesh"}, {"codec", kind.substr(kind.find(':') + 1)}, {"rate_hz", reader->layout().rate_hz}};
   result.update(stream_fields(*reader));
-  print(result, options.json);
+  print_result(result, options.json);
 }
 
 void add_mesh_encode(CLI::App& mesh, Session& session) {
