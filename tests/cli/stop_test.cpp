@@ -129,7 +129,9 @@ TEST_F(Stop, in_the_middle_of_its_work_every_command_ends_and_leaves_nothing) {
     Command command(work.arguments);
     // Its input lies in memory: from here on it works.
     for (std::int64_t read = 0; read >= 0 && read < size && !ended(command.id(), 1);) read = bytes_read(command.id());
-    if (!ended(command.id(), 0)) ASSERT_EQ(::kill(command.id(), SIGTERM), 0);
+    if (!ended(command.id(), 0)) {
+      ASSERT_EQ(::kill(command.id(), SIGTERM), 0);
+    }
     ASSERT_TRUE(ended(command.id(), patience_ms)) << "it goes on";
     const CommandResult result = command.finish();
     if (work.long_work || result.code != 0) {

@@ -119,7 +119,9 @@ TEST_F(LibrarySchema, extending_holds_a_row_in_memory_and_not_the_library) {
   const test::AllocationMeter meter;
   extend();
   // Two caches of 16 MiB, the row, and its copy on the way.
-  if (test::AllocationMeter::counts()) EXPECT_LT(meter.peak(), 48U << 20);
+  if (test::AllocationMeter::counts()) {
+    EXPECT_LT(meter.peak(), 48U << 20);
+  }
   EXPECT_EQ(Library::open_read_only(path_).artifact_keys("big").size(), rows);
 }
 
