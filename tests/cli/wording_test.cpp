@@ -75,7 +75,7 @@ TEST_F(Wording, a_file_where_a_clip_of_the_library_is_asked_for_is_told) {
 }
 
 TEST_F(Wording, folders_and_gltf_are_called_so) {
-  for (const std::string& command : {"info", "compare", "convert", "clean"}) {
+  for (const std::string command : {"info", "compare", "convert", "clean"}) {
     std::vector<std::string> arguments{command, at("clips")};
     if (command == "compare") arguments.push_back(at("clips"));
     if (command == "convert") arguments.push_back(at("o.bvh"));

@@ -257,7 +257,7 @@ TEST(RunSampler, samples_a_long_run_as_one_spline_would) {
   for (int f = 0; f < frames; ++f) {
     for (int c = 0; c < 7; ++c) values(f, c) = std::sin(0.01 * (c + 1) * f) + ((7 * f + c) % 11) * 0.1;
   }
-  const RunSampler sampler(values, Run{{0, frames - 1}}, 120);
+  const RunSampler sampler(values, kinespace::Run{{0, frames - 1}}, 120);
   for (const auto& [first, last] :
        {std::pair(0, 110), {5, 130}, {6000, 6100}, {frames - 120, frames - 1}, {0, frames - 1}}) {
     const SampleMatrix wanted = sampled_from_one_spline(values, 120, first, last, 64);

@@ -209,7 +209,7 @@ TEST(GltfDocument, the_sum_of_all_that_is_decoded_stays_below_the_bound) {
     const int n = name == "joints of every part"   ? 3000
                   : name == "skins"                ? 10'000
                   : name == "frames"               ? 30'000
-                  : name == "frames of many nodes" ? 1000
+                  : name == "frames of many nodes" ? 2001  // keys so far apart that they give no rate
                                                    : 40'000;
     const std::string text = make(n).dump();
     ASSERT_LT(text.size(), 4'200'000U);
