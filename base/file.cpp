@@ -189,9 +189,10 @@ class PendingFile {
 FileContent::FileContent(const std::filesystem::path& path) : FileContent() {
   // Non-blocking: opening a pipe that nobody writes to would wait for ever.
   const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (fd.get() < 0) {
-    fail(ErrorKind::bad_input, path, "cannot open", errno, "check the path and its permissions");
+  if (fd.get() < 0 && errno == ENOENT) {
+    throw Error(ErrorKind::bad_input, {.file = path.string(), .found = "no such file", .remedy = "check the path"});
   }
+  if (fd.get() < 0) fail(ErrorKind::bad_input, path, "cannot open", errno, "check its permissions");
   struct stat status {};
   if (::fstat(fd.get(), &status) != 0) fail(ErrorKind::machine, path, "cannot stat", errno, "");
   if (!S_ISREG(status.st_mode)) {

@@ -90,20 +90,30 @@ class FileNames {
   explicit FileNames(std::string ending) : ending_(std::move(ending)) {}
 
   fs::path make(const std::string& clip) {
-    const std::string plain = file_path_below(clip.empty() ? "clip" : clip);
+    std::string plain = file_path_below(clip.empty() ? "clip" : clip);
+    // Where a file stands that would have to be a folder, no number behind the name helps.
+    if (needs_folder_at_file(plain)) plain = file_name_part(plain);
     std::string name = plain;
     for (int n = 2; !take(name + ending_); ++n) name = fmt::format("{} ({})", plain, n);
     return name + ending_;
   }
 
  private:
+  static std::vector<std::string> folders_above(const std::string& file) {
+    std::vector<std::string> out;
+    for (fs::path folder = fs::path(file).parent_path(); !folder.empty(); folder = folder.parent_path()) {
+      out.push_back(folder.string());
+    }
+    return out;
+  }
+
+  [[nodiscard]] bool needs_folder_at_file(const std::string& file) const {
+    return std::ranges::any_of(folders_above(file), [&](const std::string& folder) { return files_.contains(folder); });
+  }
+
   bool take(const std::string& file) {
     if (folders_.contains(file) || files_.contains(file)) return false;
-    std::vector<std::string> above;
-    for (fs::path folder = fs::path(file).parent_path(); !folder.empty(); folder = folder.parent_path()) {
-      above.push_back(folder.string());
-      if (files_.contains(above.back())) return false;
-    }
+    const std::vector<std::string> above = folders_above(file);
     files_.insert(file);
     folders_.insert(above.begin(), above.end());
     return true;

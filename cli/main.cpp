@@ -3,7 +3,6 @@
 //   0 done   1 the input is bad   2 usage   3 the machine could not   128 + N stopped by signal N (Ctrl-C: 130)
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <exception>
@@ -41,19 +40,11 @@ int report(ErrorKind kind, std::string_view message) {
   return static_cast<int>(kind);
 }
 
-std::atomic<bool> memory_ran_out{false};
-
-void remember_lack_of_memory() {
-  memory_ran_out = true;
-  throw std::bad_alloc();
-}
-
-// Memory that runs out inside a function that promised not to throw (there are some in the libraries below) ends the
-// process here instead of in a core dump. Nothing is half-written: outputs are put in place whole.
-[[noreturn]] void end_at_once() {
-  if (memory_ran_out) ::_exit(report(ErrorKind::machine, no_memory));
-  kinespace::cli::tell("unexpected end, please report it");
-  std::abort();
+// Memory that runs out ends the process where it does: some of the libraries below do not survive an exception there
+// (functions that promised not to throw, objects left half-made). Nothing is half-written: outputs are put in place
+// whole, and their temporaries go with the next run.
+[[noreturn]] void end_without_memory() {
+  ::_exit(report(ErrorKind::machine, no_memory));
 }
 
 // The command line up to the subcommand, for "try ... --help".
@@ -119,8 +110,7 @@ int flush_results(int code) {
 
 int main(int argc, char** argv) {
   start_again_with_one_blas_thread(argv);
-  std::set_new_handler(remember_lack_of_memory);
-  std::set_terminate(end_at_once);
+  std::set_new_handler(end_without_memory);
   try {
     kinespace::cli::open_standard_descriptors();
     kinespace::cli::Session session;

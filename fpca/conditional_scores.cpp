@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "fpca/blas.h"
+#include "kernels/blas_call.h"
 
 namespace kinespace {
 
@@ -24,6 +25,7 @@ ConditionalScores::ConditionalScores(const Eigen::MatrixXd& functions, const Eig
   const arma::mat view(const_cast<double*>(gram.data()), size, size, false, true);  // NOLINT: read only
   arma::vec values(values_.data(), size, false, true);
   arma::mat vectors(root_vectors_.data(), size, size, false, true);
+  const BlasCall call;
   if (!arma::eig_sym(values, vectors, view)) {
     throw Error(ErrorKind::machine,
                 {.found = "an eigenproblem that did not converge", .expected = "conditional scores"});

@@ -1,10 +1,12 @@
 #include "kernels/blas_call.h"
 
-#include <condition_variable>
 #include <cstddef>
 #include <mutex>
+#include <vector>
 
+#include <cblas.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 
 #include "base/error.h"
 
@@ -14,12 +16,35 @@ namespace {
 // What OpenBLAS asks for, and a little for what the call itself needs.
 constexpr std::size_t blas_buffer_bytes = (std::size_t{128} << 20) + (std::size_t{1} << 20);
 
-// OpenBLAS has one set of buffers for the process.
+bool is_address_space_limited() {
+  struct rlimit limit {};
+  return ::getrlimit(RLIMIT_AS, &limit) == 0 && limit.rlim_cur != RLIM_INFINITY;
+}
+
+void require_address_space() {
+  void* const memory =
+      ::mmap(nullptr, blas_buffer_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+  if (memory == MAP_FAILED) {
+    throw Error(ErrorKind::machine, {.file = {},
+                                     .line = 0,
+                                     .found = "too little address space for the matrix products",
+                                     .expected = "128 MiB more",
+                                     .remedy = "raise the limit (ulimit -v)"});
+  }
+  ::munmap(memory, blas_buffer_bytes);
+}
+
+// A product large enough that OpenBLAS takes its buffer now, and not when others have taken the room.
+void make_blas_take_its_buffer() {
+  constexpr int n = 96;
+  const std::vector<float> a(std::size_t{n} * n, 1.0F);
+  std::vector<float> out(a.size());
+  cblas_sgemm(CblasRowMajor, CblasNoTrans, CblasNoTrans, n, n, n, 1, a.data(), n, a.data(), n, 0, out.data(), n);
+}
+
 struct BlasRoom {
   std::mutex mutex;
-  std::condition_variable left;
-  int buffers = 0;  // that OpenBLAS has or may take
-  int inside = 0;   // threads
+  bool taken = false;  // OpenBLAS has its buffer
 };
 
 BlasRoom& blas_room() {
@@ -27,40 +52,17 @@ BlasRoom& blas_room() {
   return room;
 }
 
-bool has_address_space() {
-  void* const memory =
-      mmap(nullptr, blas_buffer_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
-  if (memory == MAP_FAILED) return false;
-  munmap(memory, blas_buffer_bytes);
-  return true;
-}
-
 }  // namespace
 
 BlasCall::BlasCall() {
+  static const bool limited = is_address_space_limited();
+  if (!limited) return;
   BlasRoom& room = blas_room();
-  std::unique_lock lock(room.mutex);
-  while (room.inside == room.buffers) {
-    if (has_address_space()) {
-      ++room.buffers;
-    } else if (room.buffers > 0) {
-      room.left.wait(lock);
-    } else {
-      throw Error(ErrorKind::machine, {.file = {},
-                                       .line = 0,
-                                       .found = "too little address space for the matrix products",
-                                       .expected = "128 MiB more",
-                                       .remedy = "raise the limit (ulimit -v)"});
-    }
-  }
-  ++room.inside;
-}
-
-BlasCall::~BlasCall() {
-  BlasRoom& room = blas_room();
-  const std::scoped_lock lock(room.mutex);
-  --room.inside;
-  room.left.notify_one();
+  alone_ = std::unique_lock(room.mutex);
+  if (room.taken) return;
+  require_address_space();
+  make_blas_take_its_buffer();
+  room.taken = true;
 }
 
 }  // namespace kinespace

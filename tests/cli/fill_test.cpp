@@ -87,7 +87,7 @@ TEST_F(FillCommand, refuses_bad_gaps_and_writes_nothing) {
   expect({"--from", "3", "--to", "9"}, 2, "from 0 to");
   expect({"--from", "0", "--to", "1"}, 1, "seen frames before the gap");
   expect({"--from", "0.5", "--to", "3.5", "--max-gap", "1"}, 1, "at most 1 s");
-  expect({"--max-gap", "-1"}, 2, "max_gap_s");
+  expect({"--max-gap", "-1"}, 2, "--max-gap");
   write_clip(in(), truth_);
   expect({}, 1, "no missing frames");
 }

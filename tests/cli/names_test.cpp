@@ -100,7 +100,8 @@ TEST_F(HostileNames, json_has_the_true_name) {
   const CommandResult result = run_command({"query", library(), clip().string(), "-k", "100", "--json"});
   ASSERT_EQ(result.code, 0) << result.err;
   std::set<std::string> names;
-  for (const json& match : json::parse(result.out)["matches"]) names.insert(match["clip"]);
+  const json printed = json::parse(result.out);
+  for (const json& match : printed["matches"]) names.insert(match["clip"]);
   EXPECT_TRUE(names.contains(evil_name));
 }
 
@@ -126,7 +127,8 @@ TEST(ClipNames, folders_of_clips_are_kept_apart_through_a_stream) {
   ASSERT_EQ(run_command({"encode", (folder / "a").string(), (folder / "b").string(), "-o", stream}).code, 0);
   const CommandResult info = run_command({"info", stream, "--json"});
   std::set<std::string> names;
-  for (const json& clip : json::parse(info.out)["clip_list"]) names.insert(clip["name"]);
+  const json printed = json::parse(info.out);
+  for (const json& clip : printed["clip_list"]) names.insert(clip["name"]);
   EXPECT_EQ(names, (std::set<std::string>{"a/walk", "b/walk", "run"})) << "as build names them";
 
   const CommandResult decoded = run_command({"decode", stream, "-o", (folder / "d").string()});

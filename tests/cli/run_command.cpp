@@ -76,7 +76,7 @@ Command::Command(const std::vector<std::string>& arguments, const CommandOptions
   folder_ = name;
   std::vector<std::string> words;
   if (!options.shell.empty()) words = {"/bin/sh", "-c", options.shell, "sh"};
-  words.emplace_back(KINESPACE_COMMAND);
+  words.emplace_back(KINESPACE_COMMAND_PATH);
   words.insert(words.end(), arguments.begin(), arguments.end());
   std::vector<std::string> environment = environment_with(options.environment);
   const std::string out = options.output_to.empty() ? (folder_ / "out").string() : options.output_to;

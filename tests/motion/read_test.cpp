@@ -71,7 +71,7 @@ TEST(ReadClip, what_it_cannot_read_is_a_clear_error) {
   EXPECT_THAT(error("folder").found, HasSubstr("a folder"));
   EXPECT_THAT(error("a").found, HasSubstr("no ending"));
   EXPECT_THAT(error("a.asf").remedy, HasSubstr(".amc"));
-  EXPECT_THAT(error("none.bvh").found, HasSubstr("cannot open"));
+  EXPECT_THAT(error("none.bvh").found, HasSubstr("no such file"));
 }
 
 TEST(WriteClip, an_ending_it_cannot_write_is_an_error_of_the_call) {
