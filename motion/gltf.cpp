@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 #include <sstream>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,7 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/printable.h"
 #include "motion/motion_builder.h"
 #include "motion/text.h"
 
@@ -25,29 +27,12 @@ constexpr double metres = 0.01;             // in a centimetre
 constexpr std::size_t most_joints = 65536;  // a vertex names its joint in 16 bits
 
 // JSON holds UTF-8 only; what a file has else in a name becomes '?'.
-std::string utf8(const std::string& text) {
+std::string utf8(std::string_view text) {
   std::string out;
-  for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    const std::size_t length = lead < 0x80                   ? 1
-                               : lead >= 0xc2 && lead < 0xe0 ? 2
-                               : lead >= 0xe0 && lead < 0xf0 ? 3
-                               : lead >= 0xf0 && lead < 0xf5 ? 4
-                                                             : 0;
-    bool good = length > 0 && i + length <= text.size();
-    for (std::size_t k = 1; good && k < length; ++k) good = (static_cast<unsigned char>(text[i + k]) & 0xc0) == 0x80;
-    if (good && length > 2) {  // overlong forms, surrogates, beyond U+10FFFF
-      const auto second = static_cast<unsigned char>(text[i + 1]);
-      good = !(lead == 0xe0 && second < 0xa0) && !(lead == 0xed && second > 0x9f) && !(lead == 0xf0 && second < 0x90) &&
-             !(lead == 0xf4 && second > 0x8f);
-    }
-    if (good) {
-      out.append(text, i, length);
-      i += length;
-    } else {
-      out += '?';
-      ++i;
-    }
+  while (!text.empty()) {
+    const CharacterOfText next = first_character(text);
+    next.well_formed ? out.append(text.substr(0, next.bytes)) : out.append(1, '?');
+    text.remove_prefix(next.bytes);
   }
   return out;
 }
