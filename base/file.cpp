@@ -1,5 +1,6 @@
 #include "base/file.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -7,6 +8,8 @@
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
+#include <new>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -57,6 +60,11 @@ void write_all(int fd, std::string_view content, const std::filesystem::path& pa
   }
 }
 
+void write_all(int fd, const FileToWrite& file) {
+  write_all(fd, file.content, file.path);
+  if (file.more) file.more([&](std::string_view piece) { write_all(fd, piece, file.path); });
+}
+
 constexpr std::string_view temporary_prefix = ".kinespace-";
 
 // Short, so that any target's name leaves room for it; the process is in it, so that what a killed one left is known.
@@ -80,10 +88,10 @@ bool is_device(const std::filesystem::path& path) {
 }
 
 // A terminal, a pipe, /dev/null: nothing to replace, and nothing that may be replaced.
-void write_to_device(const std::filesystem::path& path, std::string_view content) {
-  const Descriptor fd(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
-  if (fd.get() < 0) fail(ErrorKind::machine, path, "cannot open", errno, "check its permissions");
-  write_all(fd.get(), content, path);
+void write_to_device(const FileToWrite& file) {
+  const Descriptor fd(::open(file.path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (fd.get() < 0) fail(ErrorKind::machine, file.path, "cannot open", errno, "check its permissions");
+  write_all(fd.get(), file);
 }
 
 FileKind kind_on_disk(const std::filesystem::path& path) {
@@ -102,11 +110,12 @@ void sync_folder(const std::filesystem::path& folder) {
 // A file that lies whole and flushed beside its target, under a temporary name, until it is put in its place.
 class PendingFile {
  public:
-  PendingFile(const std::filesystem::path& path, std::string_view content) : PendingFile(path) {
+  explicit PendingFile(const FileToWrite& file) : PendingFile(file.path) {
+    const std::filesystem::path& path = file.path;
     std::error_code code;
     target_ = std::filesystem::weakly_canonical(std::filesystem::absolute(path, code), code);
     if (code) fail(ErrorKind::machine, path, "cannot be found", code.value(), "check the path and the working folder");
-    require_replaceable(target_, file_kind(std::as_bytes(std::span(content))));
+    require_replaceable(target_, file_kind(std::as_bytes(std::span(file.content))));
     const Descriptor opened(create_temporary(folder(), name_));
     if (opened.get() < 0) {
       const int why = errno;
@@ -114,7 +123,7 @@ class PendingFile {
       fail(ErrorKind::machine, path, "cannot create a file in " + folder().string(), why,
            "check that the folder exists and is writable");
     }
-    fill(opened, content);
+    fill(opened, file);
   }
   ~PendingFile() { discard(); }
   PendingFile(PendingFile&& other) noexcept
@@ -156,12 +165,12 @@ class PendingFile {
   // The constructor that is done when the other one begins its work: from then on the destructor clears up.
   explicit PendingFile(const std::filesystem::path& path) : shown_(path) {}
 
-  void fill(const Descriptor& file, std::string_view content) const {
-    write_all(file.get(), content, shown_);
+  void fill(const Descriptor& opened, const FileToWrite& file) const {
+    write_all(opened.get(), file);
     // A file that was there keeps its permissions.
     struct stat old {};
-    if (::stat(target_.c_str(), &old) == 0) ::fchmod(file.get(), old.st_mode & 07777);
-    if (::fsync(file.get()) != 0) {
+    if (::stat(target_.c_str(), &old) == 0) ::fchmod(opened.get(), old.st_mode & 07777);
+    if (::fsync(opened.get()) != 0) {
       fail(ErrorKind::machine, shown_, "cannot flush", errno, "free some space or choose another place");
     }
   }
@@ -184,50 +193,70 @@ class PendingFile {
   return error == std::errc() && end != name.data() + name.size() && *end == '-' && maker > 0 ? maker : 0;
 }
 
-}  // namespace
-
-FileContent::FileContent(const std::filesystem::path& path) : FileContent() {
-  // Non-blocking: opening a pipe that nobody writes to would wait for ever.
-  const Descriptor fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (fd.get() < 0 && errno == ENOENT) {
-    throw Error(ErrorKind::bad_input, {.file = path.string(), .found = "no such file", .remedy = "check the path"});
-  }
-  if (fd.get() < 0) fail(ErrorKind::bad_input, path, "cannot open", errno, "check its permissions");
-  struct stat status {};
-  if (::fstat(fd.get(), &status) != 0) fail(ErrorKind::machine, path, "cannot stat", errno, "");
-  if (!S_ISREG(status.st_mode)) {
-    throw Error(ErrorKind::bad_input, {.file = path.string(), .found = "not a regular file", .expected = "a file"});
-  }
-  size_ = static_cast<std::size_t>(status.st_size);
-  if (size_ == 0) return;
-  void* data = ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-  if (data == MAP_FAILED) {
-    fail(ErrorKind::machine, path, fmt::format("cannot hold its {} bytes", size_), errno, "close other programs");
-  }
-  ::madvise(data, size_, MADV_HUGEPAGE);  // a fault for 2 MiB instead of one for each 4 KiB
-  data_ = static_cast<char*>(data);
-  read_whole(fd.get(), path);
+std::string hexadecimal(const XXH128_hash_t& hash) {
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
 
+}  // namespace
+
+FileReader::FileReader(std::filesystem::path path) : path_(std::move(path)) {
+  // Non-blocking: opening a pipe that nobody writes to would wait for ever.
+  Descriptor fd(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (fd.get() < 0 && errno == ENOENT) {
+    throw Error(ErrorKind::bad_input, {.file = path_.string(), .found = "no such file", .remedy = "check the path"});
+  }
+  if (fd.get() < 0) fail(ErrorKind::bad_input, path_, "cannot open", errno, "check its permissions");
+  struct stat status {};
+  if (::fstat(fd.get(), &status) != 0) fail(ErrorKind::machine, path_, "cannot stat", errno, "");
+  if (!S_ISREG(status.st_mode)) {
+    throw Error(ErrorKind::bad_input, {.file = path_.string(), .found = "not a regular file", .expected = "a file"});
+  }
+  size_ = static_cast<std::size_t>(status.st_size);
+  fd_ = fd.release();
+}
+
+FileReader::~FileReader() {
+  if (fd_ >= 0) ::close(fd_);
+}
+
+FileReader::FileReader(FileReader&& other) noexcept
+    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), size_(other.size_), at_(other.at_) {}
+
 // Read, not mapped: what another process cuts off a mapped file is a signal when it is touched.
-void FileContent::read_whole(int fd, const std::filesystem::path& path) {
+std::size_t FileReader::read(std::span<char> room) {
   const auto changed = [&](std::string found) {
-    throw Error(ErrorKind::bad_input, {.file = path.string(),
+    throw Error(ErrorKind::bad_input, {.file = path_.string(),
                                        .found = std::move(found),
                                        .expected = "a file that stays as it is while it is read",
                                        .remedy = "wait until it is complete"});
   };
-  for (std::size_t at = 0; at < size_;) {
-    const ssize_t got = ::read(fd, data_ + at, size_ - at);
+  room = room.first(std::min(room.size(), remaining()));
+  for (std::size_t done = 0; done < room.size();) {
+    const ssize_t got = ::read(fd_, room.data() + done, room.size() - done);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) fail(ErrorKind::machine, path, "cannot read", errno, "check the disk");
-    if (got == 0) changed(fmt::format("its end after {} bytes, which were {} when it was opened", at, size_));
-    at += static_cast<std::size_t>(got);
+    if (got < 0) fail(ErrorKind::machine, path_, "cannot read", errno, "check the disk");
+    if (got == 0) changed(fmt::format("its end after {} bytes, which were {} when it was opened", at_, size_));
+    done += static_cast<std::size_t>(got);
+    at_ += static_cast<std::size_t>(got);
   }
   struct stat status {};
-  if (::fstat(fd, &status) == 0 && static_cast<std::size_t>(status.st_size) != size_) {
+  if (remaining() == 0 && ::fstat(fd_, &status) == 0 && static_cast<std::size_t>(status.st_size) != size_) {
     changed(fmt::format("{} bytes, which were {} when it was opened", status.st_size, size_));
   }
+  return room.size();
+}
+
+FileContent::FileContent(const std::filesystem::path& path) : FileContent() {
+  FileReader file(path);
+  if (file.size() == 0) return;
+  void* data = ::mmap(nullptr, file.size(), PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (data == MAP_FAILED) {
+    fail(ErrorKind::machine, path, fmt::format("cannot hold its {} bytes", file.size()), errno, "close other programs");
+  }
+  size_ = file.size();
+  ::madvise(data, size_, MADV_HUGEPAGE);  // a fault for 2 MiB instead of one for each 4 KiB
+  data_ = static_cast<char*>(data);
+  file.read({data_, size_});
 }
 
 FileContent::~FileContent() {
@@ -247,7 +276,7 @@ void write_files_atomically(std::span<const FileToWrite> files) {
   std::vector<PendingFile> pending;
   pending.reserve(files.size());
   for (const FileToWrite& file : files) {
-    if (!is_device(file.path)) pending.emplace_back(file.path, file.content);
+    if (!is_device(file.path)) pending.emplace_back(file);
   }
   if (pending.size() > 1) {
     for (PendingFile& file : pending) file.keep_old();
@@ -261,7 +290,7 @@ void write_files_atomically(std::span<const FileToWrite> files) {
   // The renames themselves must survive a power cut.
   for (const PendingFile& file : pending) sync_folder(file.folder());
   for (const FileToWrite& file : files) {
-    if (is_device(file.path)) write_to_device(file.path, file.content);
+    if (is_device(file.path)) write_to_device(file);
   }
 }
 
@@ -305,8 +334,25 @@ void remove_leftovers(const std::filesystem::path& folder) {
 }
 
 std::string content_hash(std::span<const std::byte> bytes) {
-  const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
-  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+  return hexadecimal(XXH3_128bits(bytes.data(), bytes.size()));
+}
+
+std::string hash_of_file(const std::filesystem::path& path) {
+  constexpr std::size_t piece_bytes = 1 << 20;
+  FileReader file(path);
+  const std::unique_ptr<XXH3_state_t, XXH_errorcode (*)(XXH3_state_t*)> state(XXH3_createState(), XXH3_freeState);
+  if (!state) throw std::bad_alloc();
+  XXH3_128bits_reset(state.get());
+  std::vector<char> piece(std::min(piece_bytes, file.size()));
+  while (file.remaining() > 0) XXH3_128bits_update(state.get(), piece.data(), file.read(piece));
+  return hexadecimal(XXH3_128bits_digest(state.get()));
+}
+
+std::string start_of_file(const std::filesystem::path& path) {
+  FileReader file(path);
+  std::string out(std::min(file_kind_bytes, file.size()), '\0');
+  file.read(out);
+  return out;
 }
 
 std::uint64_t checksum64(std::span<const std::byte> bytes) {

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -20,11 +21,34 @@
 
 namespace kinespace {
 
+// A file read from its beginning to its end, piece by piece.
+class FileReader {
+ public:
+  // Throws Error: bad_input when the file is missing, not a regular file, or changes its length while it is read;
+  // machine when it cannot be read.
+  explicit FileReader(std::filesystem::path path);
+  ~FileReader();
+  FileReader(FileReader&& other) noexcept;
+  FileReader& operator=(FileReader&& other) = delete;
+  FileReader(const FileReader&) = delete;
+  FileReader& operator=(const FileReader&) = delete;
+
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] std::size_t remaining() const noexcept { return size_ - at_; }
+  // The next bytes: as many as there is room for, or all that are left. Returns how many.
+  std::size_t read(std::span<char> room);
+
+ private:
+  std::filesystem::path path_;
+  int fd_ = -1;
+  std::size_t size_ = 0;
+  std::size_t at_ = 0;
+};
+
 // The bytes of a file, in memory of their own: what happens to the file afterwards does not matter.
 class FileContent {
  public:
-  // Throws Error: bad_input when the file is missing, not a regular file, or changes its length while it is read;
-  // machine when it cannot be read or held.
+  // Throws Error as FileReader does, and Error{machine} when there is no memory for the file.
   explicit FileContent(const std::filesystem::path& path);
   ~FileContent();
   FileContent(FileContent&& other) noexcept;
@@ -39,7 +63,6 @@ class FileContent {
 
  private:
   FileContent() = default;
-  void read_whole(int fd, const std::filesystem::path& path);
 
   char* data_ = nullptr;
   std::size_t size_ = 0;
@@ -50,11 +73,15 @@ class FileContent {
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 void write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> content);
 
+// Takes the next piece of a file that is written piece by piece.
+using FileSink = std::function<void(std::string_view)>;
+
 // Files that belong together, all or none: every one is complete and flushed before the first is put in its place, and
 // when one cannot be, those before it are taken back.
 struct FileToWrite {
   std::filesystem::path path;
-  std::string_view content;
+  std::string_view content;                        // with enough of the beginning to tell its kind
+  std::function<void(const FileSink&)> more = {};  // hands over what follows; none: nothing does
 };
 void write_files_atomically(std::span<const FileToWrite> files);
 
@@ -70,6 +97,11 @@ void require_different_files(const std::filesystem::path& input, const std::file
 
 // 128-bit XXH3 of the bytes, as 32 hexadecimal digits: the identity of a source file, not a cryptographic promise.
 [[nodiscard]] std::string content_hash(std::span<const std::byte> bytes);
+// Of a file, read piece by piece. Throws Error as FileReader does.
+[[nodiscard]] std::string hash_of_file(const std::filesystem::path& path);
+
+// Its first bytes, file_kind_bytes or all. Throws Error as FileReader does.
+[[nodiscard]] std::string start_of_file(const std::filesystem::path& path);
 
 // 64-bit XXH3 of the bytes: the checksum of the sections of a bitstream.
 [[nodiscard]] std::uint64_t checksum64(std::span<const std::byte> bytes);

@@ -56,7 +56,9 @@ Json describe_clip(const InfoOptions& options, Session& session) {
 }
 
 bool is_library(const std::filesystem::path& file) {
-  return std::filesystem::is_regular_file(file) && Library::looks_like_library(FileContent(file).bytes());
+  if (!std::filesystem::is_regular_file(file)) return false;
+  const std::string start = start_of_file(file);
+  return Library::looks_like_library(std::as_bytes(std::span(start)));
 }
 
 Json describe_space(LibraryView& view, const SpaceRow& row) {
@@ -118,7 +120,9 @@ Json describe_library(const InfoOptions& options, Session& /*session*/) {
 }
 
 bool is_stream(const std::filesystem::path& file) {
-  return std::filesystem::is_regular_file(file) && Bitstream::has_magic(FileContent(file).bytes());
+  if (!std::filesystem::is_regular_file(file)) return false;
+  const std::string start = start_of_file(file);
+  return Bitstream::has_magic(std::as_bytes(std::span(start)));
 }
 
 Json describe_stream(const InfoOptions& options, Session& /*session*/) {

@@ -59,7 +59,7 @@ std::string clip_space_name(const std::string& tree_hash) {
 
 std::string source_hash_of(const std::filesystem::path& file, const std::optional<std::filesystem::path>& asf) {
   std::string hash;
-  for (const auto& part : files_read(file, asf)) hash += content_hash(FileContent(part).bytes());
+  for (const auto& part : files_read(file, asf)) hash += hash_of_file(part);
   return hash;
 }
 

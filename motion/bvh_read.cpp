@@ -75,7 +75,7 @@ const char* parse_row(const TextSource& source, const char* at, ColumnBlock& blo
 
 class MotionParser {
  public:
-  MotionParser(const TextSource& source, BvhHeader header, std::string name)
+  MotionParser(TextSource& source, BvhHeader header, std::string name)
       : source_(source),
         at_(header.data),
         frames_(header.frames),
@@ -84,8 +84,7 @@ class MotionParser {
         block_(width_) {
     if (width_ == 0) source.fail(at_, "a skeleton without channels", "channels of at least one joint");
     // Every number takes a digit and a separator: a count that the file cannot hold is found before it costs memory.
-    const auto left = static_cast<std::size_t>(source.end() - at_);
-    if (static_cast<std::size_t>(frames_) > left / (2 * width_) + 1) fail_count(count_lines());
+    if (static_cast<std::size_t>(frames_) > source.remaining(at_) / (2 * width_) + 1) fail_count(0);
     require_honest_size(source, header.skeleton.joints.size(), frames_);
     zeros_.assign(static_cast<std::size_t>(block_.rows()), 0);
     clip_ = make_clip(std::move(name), std::move(header.skeleton), header.rate_hz, frames_);
@@ -98,42 +97,52 @@ class MotionParser {
     for (int first = 0; first < frames_; first += block_.rows()) {
       const int count = std::min(block_.rows(), frames_ - first);
       for (int row = 0; row < count; ++row) {
-        skip_space();
-        if (at_ == source_.end()) fail_count(first + row);
+        if (!next_line()) fail_count(first + row);
         at_ = parse_row(source_, at_, block_, width_, row);
       }
       store(first, count);
     }
-    skip_space();
-    if (at_ != source_.end()) fail_count(frames_ + count_lines());
+    if (next_line()) fail_count(frames_);
     finish_translations(std::move(translations_), clip_);
     return std::move(clip_);
   }
 
  private:
-  void skip_space() {
-    while (at_ != source_.end() && is_space(*at_)) ++at_;
+  // Goes to the next line with something in it, all of which is in hand then; false at the end.
+  bool next_line() {
+    do {
+      while (at_ != source_.end() && is_space(*at_)) ++at_;
+    } while (at_ == source_.end() && source_.more(at_));
+    if (at_ == source_.end()) return false;
+    source_.hold_line(at_);
+    return true;
   }
 
-  [[noreturn]] void fail_count(std::int64_t found) const {
-    source_.fail(found < frames_ ? source_.end() : at_,
-                 std::to_string(found) + (found == 1 ? " frame" : " frames") + " of data",
-                 std::to_string(frames_) + " as \"Frames:\" says",
-                 found < frames_ ? "the file is cut short" : "correct the frame count");
+  // After so many frames: with the lines from here on there are too few or too many.
+  [[noreturn]] void fail_count(std::int64_t before) {
+    const std::int64_t line = source_.line_of(at_);
+    const std::int64_t found = before + count_lines();
+    const bool short_of = found < frames_;
+    source_.fail_in_line(short_of ? source_.line_of(at_) : line,
+                         std::to_string(found) + (found == 1 ? " frame" : " frames") + " of data",
+                         std::to_string(frames_) + " as \"Frames:\" says",
+                         short_of ? "the file is cut short" : "correct the frame count");
   }
 
   // Lines with something in them, from here on.
-  [[nodiscard]] std::int64_t count_lines() const {
+  [[nodiscard]] std::int64_t count_lines() {
     std::int64_t lines = 0;
     bool blank = true;
-    for (const char* p = at_; p != source_.end(); ++p) {
-      if (is_line_end(*p)) {
-        blank = true;
-      } else if (blank && !is_blank(*p)) {
-        blank = false;
-        ++lines;
+    do {
+      for (; at_ != source_.end(); ++at_) {
+        if (is_line_end(*at_)) {
+          blank = true;
+        } else if (blank && !is_blank(*at_)) {
+          blank = false;
+          ++lines;
+        }
       }
-    }
+    } while (source_.more(at_));
     return lines;
   }
 
@@ -157,7 +166,7 @@ class MotionParser {
     }
   }
 
-  const TextSource& source_;
+  TextSource& source_;
   const char* at_;
   int frames_;
   std::size_t width_;
@@ -168,15 +177,20 @@ class MotionParser {
   std::vector<TranslationBuilder> translations_;
 };
 
+Clip parse(TextSource& source) {
+  return MotionParser(source, parse_bvh_header(source), std::filesystem::path(source.name()).stem().string()).parse();
+}
+
 }  // namespace
 
 Clip parse_bvh(std::string_view text, const std::string& source_name) {
-  const TextSource source(text, source_name);
-  return MotionParser(source, parse_bvh_header(source), std::filesystem::path(source_name).stem().string()).parse();
+  TextSource source(text, source_name);
+  return parse(source);
 }
 
 Clip read_bvh(const std::filesystem::path& path) {
-  return parse_bvh(FileContent(path).text(), path.string());
+  TextSource source(path);
+  return parse(source);
 }
 
 }  // namespace kinespace

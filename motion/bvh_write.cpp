@@ -109,28 +109,29 @@ std::vector<int> depth_first(const Skeleton& skeleton) {
 
 class MotionWriter {
  public:
-  MotionWriter(const Clip& clip, const JointChannels& channels, const std::vector<int>& walk, std::string& out)
+  MotionWriter(const Clip& clip, const JointChannels& channels, const std::vector<int>& walk)
       : clip_(clip),
         channels_(channels),
         walk_(walk),
-        out_(out),
         width_(count(channels)),
         block_(width_),
         near_(channels.size()),
         columns_(3 * static_cast<std::size_t>(block_.rows())) {}
 
-  void write() {
-    out_.reserve(out_.size() + static_cast<std::size_t>(clip_.frames) * (width_ * 11 + 1));
+  void write(const FileSink& sink) {
+    std::string out;  // of a block
     for (int first = 0; first < clip_.frames; first += block_.rows()) {
+      out.clear();
       const int some = std::min(block_.rows(), clip_.frames - first);
       fill(first, some);
       for (int row = 0; row < some; ++row) {
         for (std::size_t c = 0; c < width_; ++c) {
-          if (c > 0) out_ += ' ';
-          append_fixed(out_, block_.data(c)[row]);
+          if (c > 0) out += ' ';
+          append_fixed(out, block_.data(c)[row]);
         }
-        out_ += '\n';
+        out += '\n';
       }
+      sink(out);
     }
   }
 
@@ -169,32 +170,51 @@ class MotionWriter {
   const Clip& clip_;
   const JointChannels& channels_;
   const std::vector<int>& walk_;
-  std::string& out_;
   std::size_t width_;
   ColumnBlock block_;
   std::vector<EulerAngles> near_;
   std::vector<double> columns_;
 };
 
+// A clip on its way into a file: what stands before the numbers, and then those.
+class BvhText {
+ public:
+  explicit BvhText(const Clip& clip) : clip_(clip), walk_(depth_first(clip.skeleton)) {
+    for (int j = 0; j < clip.skeleton.joint_count(); ++j) channels_.push_back(channels_to_write(clip, j));
+    // A file without a single number a frame could not be read back.
+    if (std::ranges::all_of(channels_, &std::vector<Channel>::empty)) channels_[0] = {Channel::y_rotation};
+  }
+
+  [[nodiscard]] std::string head() const {
+    std::string out;
+    HierarchyWriter(clip_.skeleton, channels_, out).write(walk_);
+    out += "MOTION\nFrames: " + std::to_string(clip_.frames) + "\nFrame Time: ";
+    append_exact(out, 1 / clip_.rate_hz);
+    out += '\n';
+    return out;
+  }
+  void write_motion(const FileSink& sink) const { MotionWriter(clip_, channels_, walk_).write(sink); }
+
+ private:
+  const Clip& clip_;
+  std::vector<int> walk_;
+  JointChannels channels_;
+};
+
 }  // namespace
 
 std::string format_bvh(const Clip& clip) {
-  JointChannels channels;
-  for (int j = 0; j < clip.skeleton.joint_count(); ++j) channels.push_back(channels_to_write(clip, j));
-  // A file without a single number a frame could not be read back.
-  if (std::ranges::all_of(channels, &std::vector<Channel>::empty)) channels[0] = {Channel::y_rotation};
-  const std::vector<int> walk = depth_first(clip.skeleton);
-  std::string out;
-  HierarchyWriter(clip.skeleton, channels, out).write(walk);
-  out += "MOTION\nFrames: " + std::to_string(clip.frames) + "\nFrame Time: ";
-  append_exact(out, 1 / clip.rate_hz);
-  out += '\n';
-  MotionWriter(clip, channels, walk, out).write();
+  const BvhText text(clip);
+  std::string out = text.head();
+  text.write_motion([&](std::string_view piece) { out += piece; });
   return out;
 }
 
 void write_bvh(const std::filesystem::path& path, const Clip& clip) {
-  write_file_atomically(path, format_bvh(clip));
+  const BvhText text(clip);
+  const std::string head = text.head();
+  const FileToWrite file{path, head, [&](const FileSink& sink) { text.write_motion(sink); }};
+  write_files_atomically(std::span(&file, 1));
 }
 
 }  // namespace kinespace

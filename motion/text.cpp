@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstring>
 #include <limits>
+#include <span>
 #include <system_error>
 #include <utility>
 
@@ -14,6 +16,9 @@ namespace {
 constexpr char lower(char c) {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
+
+// Of a longer file. More than the part before the numbers takes (motion/bvh_hierarchy.h), which is read as a whole.
+constexpr std::size_t window_bytes = 16 << 20;
 
 }  // namespace
 
@@ -79,17 +84,50 @@ void append_exact(std::string& out, double value) {
 
 TextSource::TextSource(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}
 
-std::int64_t TextSource::line_of(const char* at) const {
-  std::int64_t line = 1;
+TextSource::TextSource(const std::filesystem::path& path) : name_(path.string()), file_(path) {
+  window_.resize(std::min(window_bytes, file_->size()));
+  text_ = {window_.data(), file_->read(window_)};
+}
+
+bool TextSource::more(const char*& at) {
+  if (unread() == 0) return false;
+  lines_dropped_ += line_ends_before(at);
+  const auto kept = static_cast<std::size_t>(end() - at);
+  std::memmove(window_.data(), at, kept);
+  if (kept == window_.size()) window_.resize(std::min(2 * window_.size(), kept + unread()));
+  const std::size_t got = file_->read(std::span(window_).subspan(kept));
+  text_ = {window_.data(), kept + got};
+  at = begin();
+  return true;
+}
+
+void TextSource::read_line(const char*& at) {
+  do {
+    if (!more(at)) return;
+    whole_lines_end_ = end();
+    while (whole_lines_end_ != at && !is_line_end(whole_lines_end_[-1])) --whole_lines_end_;
+  } while (whole_lines_end_ == at);
+}
+
+std::int64_t TextSource::line_ends_before(const char* at) const {
+  std::int64_t count = 0;
   for (const char* p = begin(); p != at; ++p) {
-    if (*p == '\n' || (*p == '\r' && (p + 1 == end() || p[1] != '\n'))) ++line;
+    if (*p == '\n' || (*p == '\r' && (p + 1 == end() || p[1] != '\n'))) ++count;
   }
-  return line;
+  return count;
+}
+
+std::int64_t TextSource::line_of(const char* at) const {
+  return 1 + lines_dropped_ + line_ends_before(at);
 }
 
 void TextSource::fail(const char* at, std::string found, std::string expected, std::string remedy) const {
+  fail_in_line(line_of(at), std::move(found), std::move(expected), std::move(remedy));
+}
+
+void TextSource::fail_in_line(std::int64_t line, std::string found, std::string expected, std::string remedy) const {
   throw Error(ErrorKind::bad_input, {.file = name_,
-                                     .line = line_of(at),
+                                     .line = line,
                                      .found = std::move(found),
                                      .expected = std::move(expected),
                                      .remedy = std::move(remedy)});
@@ -99,8 +137,8 @@ void TextSource::fail_at_word(const char* at, std::string expected, std::string 
   while (at != end() && is_blank(*at)) ++at;
   constexpr std::size_t longest = 60;
   const std::string_view word = word_at(at, end());
-  std::string found = at == end()             ? "the end of the file"
-                      : is_line_end(*at)      ? "the end of the line"
+  std::string found = at == end()        ? unread() == 0 ? "the end of the file" : "nothing more in its first 16 MiB"
+                      : is_line_end(*at) ? "the end of the line"
                       : word.size() > longest ? "\"" + std::string(word.substr(0, longest)) + "...\""
                                               : "\"" + std::string(word) + "\"";
   fail(at, std::move(found), std::move(expected), std::move(remedy));

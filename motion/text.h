@@ -9,8 +9,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "base/file.h"
 
 namespace kinespace {
 
@@ -86,26 +91,52 @@ void append_fixed(std::string& out, double value);
 // Appends the shortest text that reads back as the same number.
 void append_exact(std::string& out, double value);
 
-// A text and its name, for messages.
+// A text and its name, for messages: a string, or a file of which a window is in memory, so that a recording of any
+// length takes no more than its numbers do. [begin(), end()) is what is in hand; hold_line and more go on in the file,
+// drop what lies before `at`, and move `at` along with the text that it points to.
 class TextSource {
  public:
   TextSource(std::string_view text, std::string name);
+  // Throws Error as FileReader does.
+  explicit TextSource(const std::filesystem::path& path);
+  TextSource(const TextSource&) = delete;
+  TextSource& operator=(const TextSource&) = delete;
 
   [[nodiscard]] const char* begin() const { return text_.data(); }
   [[nodiscard]] const char* end() const { return text_.data() + text_.size(); }
-  [[nodiscard]] std::size_t size() const { return text_.size(); }
   [[nodiscard]] const std::string& name() const { return name_; }
+  // Bytes of the whole text, and of what follows `at`.
+  [[nodiscard]] std::size_t size() const { return file_ ? file_->size() : text_.size(); }
+  [[nodiscard]] std::size_t remaining(const char* at) const { return static_cast<std::size_t>(end() - at) + unread(); }
+
+  // Afterwards the rest of the line at `at` is in hand.
+  void hold_line(const char*& at) {
+    if (at >= whole_lines_end_ && unread() > 0) [[unlikely]]
+      read_line(at);
+  }
+  // When there is more than is in hand: some of it is, and true.
+  [[nodiscard]] bool more(const char*& at);
 
   // The line of a place, from 1. A line ends at LF, CR LF or CR.
   [[nodiscard]] std::int64_t line_of(const char* at) const;
   // Throws Error{bad_input} about a place in the text.
   [[noreturn]] void fail(const char* at, std::string found, std::string expected, std::string remedy = {}) const;
+  [[noreturn]] void fail_in_line(std::int64_t line, std::string found, std::string expected,
+                                 std::string remedy = {}) const;
   // The same, quoting the word at that place, or "the end of the line" or "of the file".
   [[noreturn]] void fail_at_word(const char* at, std::string expected, std::string remedy = {}) const;
 
  private:
+  [[nodiscard]] std::size_t unread() const { return file_ ? file_->remaining() : 0; }
+  [[nodiscard]] std::int64_t line_ends_before(const char* at) const;
+  void read_line(const char*& at);
+
   std::string_view text_;
   std::string name_;
+  std::optional<FileReader> file_;
+  std::vector<char> window_;
+  const char* whole_lines_end_ = nullptr;  // behind the last line end in the window
+  std::int64_t lines_dropped_ = 0;
 };
 
 // The word (no white space in it) that starts at `at`; empty at white space and at the end.

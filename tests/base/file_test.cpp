@@ -60,6 +60,37 @@ TEST(File, what_was_written_is_read) {
   EXPECT_THAT(files_in(folder.path()), testing::ElementsAre("a b'\".txt")) << "nothing else stays";
 }
 
+TEST(File, pieces_follow_the_beginning_and_are_read_and_hashed_piece_by_piece) {
+  const TemporaryFolder folder;
+  const std::string piece(300'000, 'p');
+  const FileToWrite file{folder / "a", "start ", [&](const FileSink& sink) {
+                           for (int i = 0; i < 10; ++i) sink(piece);
+                         }};
+  write_files_atomically(std::span(&file, 1));
+  std::string whole = "start ";
+  for (int i = 0; i < 10; ++i) whole += piece;
+  EXPECT_EQ(text_of(folder / "a"), whole);
+  EXPECT_EQ(hash_of_file(folder / "a"), content_hash(std::as_bytes(std::span(whole))));
+  EXPECT_EQ(start_of_file(folder / "a"), whole.substr(0, file_kind_bytes));
+
+  FileReader reader(folder / "a");
+  std::string room(1'000'000, ' '), read;
+  while (reader.remaining() > 0) read.append(room, 0, reader.read(room));
+  EXPECT_EQ(read, whole);
+}
+
+TEST(File, pieces_that_end_in_an_error_leave_the_old_file) {
+  const TemporaryFolder folder;
+  write_file_atomically(folder / "a", std::string_view("old"));
+  const FileToWrite file{folder / "a", "new", [](const FileSink& sink) {
+                           sink("half");
+                           throw Error(ErrorKind::machine, {.found = "no more"});
+                         }};
+  EXPECT_EQ(error_of([&] { write_files_atomically(std::span(&file, 1)); }).kind(), ErrorKind::machine);
+  EXPECT_EQ(text_of(folder / "a"), "old");
+  EXPECT_THAT(files_in(folder.path()), testing::ElementsAre("a"));
+}
+
 TEST(File, a_view_outlives_a_move_and_the_replacing_of_its_file) {
   const TemporaryFolder folder;
   write_file_atomically(folder / "a", std::string_view("old"));

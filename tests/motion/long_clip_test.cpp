@@ -1,14 +1,20 @@
 // A clip of a million frames: its text is read once, front to back, and costs memory in proportion to it. All counted:
 // what a machine makes of it is its own affair.
+#include <functional>
+#include <span>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "base/error.h"
+#include "base/file.h"
 #include "motion/amc.h"
 #include "motion/bvh.h"
 #include "tests/motion/allocation_meter.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/motion/watched_text.h"
+#include "tests/support/data.h"
 
 namespace kinespace::test {
 namespace {
@@ -88,6 +94,61 @@ TEST(LongClip, an_amc_of_a_million_frames_is_counted_and_read_with_memory_in_pro
   const Clip clip = expect_work_in_proportion(long_amc(500'000), long_amc(1'000'000), 2,
                                               [&](std::string_view text) { return parse_amc(text, asf, "long.amc"); });
   EXPECT_EQ(clip.frames, 1'000'000);
+}
+
+// What reading comes to: the clip, or the error.
+std::string outcome(const std::function<Clip()>& read) {
+  try {
+    const Clip clip = read();
+    const auto bytes = std::as_bytes(std::span(clip.rotations));
+    std::string out = std::to_string(clip.frames) + " frames " + content_hash(bytes);
+    for (const auto& track : clip.translations) out += ' ' + content_hash(std::as_bytes(std::span(track.values)));
+    return out;
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+TEST(LongClip, a_file_read_through_a_window_is_what_its_text_is_errors_and_their_lines_included) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "long.bvh";
+  const std::string text = long_bvh(900'000);
+  ASSERT_GT(text.size(), 30'000'000U) << "more than one window";
+  const std::string carriage = replaced(replaced(long_bvh(900'000), "Frames: 900000", "Frames: 900000\r"),
+                                        "30.0625 10 7 -7\n", "30.0625 10 7 -7\r\n");
+  std::string blank = text;
+  blank.insert(text.size() / 2, std::string(40'000'000, '\n'));
+  std::string wide = text;
+  wide.insert(text.find(' ', text.size() / 2), std::string(40'000'000, ' '));
+  std::string broken = text;
+  broken[text.size() - 40] = 'x';
+  for (const std::string& content :
+       {text, carriage, blank, wide, broken, text.substr(0, text.size() * 3 / 4),
+        replaced(text, "Frames: 900000", "Frames: 899998"), replaced(text, "Frames: 900000", "Frames: 900001"),
+        replaced(text, "Frames: 900000", "Frames: 2000000000"), "HIERARCHY\nROOT " + std::string(40'000'000, 'a')}) {
+    write_file_atomically(path, content);
+    const std::string of_text = outcome([&] { return parse_bvh(content, path); });
+    const std::string of_file = outcome([&] { return read_bvh(path); });
+    if (content.size() == 40'000'015U) {
+      EXPECT_THAT(of_file, testing::HasSubstr("nothing more in its first 16 MiB"));
+    } else {
+      EXPECT_EQ(of_file, of_text);
+    }
+  }
+}
+
+TEST(LongClip, a_file_costs_the_memory_of_its_numbers_and_a_window) {
+  const TemporaryFolder folder;
+  const std::string path = folder / "long.bvh";
+  write_file_atomically(path, long_bvh(1'000'000));
+  const AllocationMeter meter;
+  const Clip clip = read_bvh(path);
+  const std::size_t numbers = sizeof(double) * (clip.rotations.size() + 3 * static_cast<std::size_t>(clip.frames));
+  EXPECT_LT(meter.peak_bytes(), numbers + (20 << 20));
+
+  const AllocationMeter writing;
+  write_bvh(folder / "again.bvh", clip);
+  EXPECT_LT(writing.peak_bytes(), 1 << 20);
 }
 
 TEST(LongClip, a_text_that_is_gone_over_again_is_noticed) {
