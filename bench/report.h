@@ -93,6 +93,7 @@ struct Bench {
 [[nodiscard]] BenchReport bench_fpca(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_io(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_kernels(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_long(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_mesh(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_playback(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_retrieval(const BenchOptions& options);

@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "base/file.h"
 #include "cli/commands.h"
@@ -62,13 +63,15 @@ void run_clean(const CleanCommandOptions& options, Session& session) {
     if (!model) session.note("the library has no contact labels: the standard model decides");
   }
   if (model) clean_options.model = &*model;
-  const Clip clip = read_clip(options.input);
+  Clip clip = read_clip(options.input);
   session.note_doubts(clip);
   Session::check_stop();
-  const CleanResult result = clean(clip, clean_options);
+  std::optional<Clip> before;
+  if (options.picture) before = clip;
+  const CleanResult result = clean(std::move(clip), clean_options);
   Session::check_stop();
   write_clip(options.output, result.clip);
-  if (options.picture) write_picture(*options.picture, clip, result);
+  if (options.picture) write_picture(*options.picture, *before, result);
   for (const std::string& doubt : doubts_about(result.report)) session.warn(doubt);
   const Json out = to_json(options, result);
   options.json ? print_json(out) : print_fields(out);

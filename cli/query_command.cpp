@@ -81,9 +81,8 @@ std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options
                    .expected = "the joint names, parents and channels of its clips",
                    .remedy = "kinespace build --add --by-skeleton adds clips of another skeleton"});
     }
-    ClipCurves curves = clip_curves(clip);
-    const Skeleton skeleton = std::move(clip.skeleton);
-    clip = {};  // a long one takes as much as its curves
+    const Skeleton skeleton = clip.skeleton;
+    ClipCurves curves = clip_curves(std::move(clip));
     return nearest(library, std::move(curves), skeleton, options, {}, compute, progress);
   }
   const ClipRow row = library.require_clip(options.clip);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -93,24 +95,69 @@ void check_contacts(const Clip& clip, const FootTracks& tracks, const FootContac
   }
 }
 
-void measure(const Clip& before, const FootTracks& tracks, const FootContacts& contacts, CleanResult& result) {
-  CleanReport& report = result.report;
-  const FootTracks after = foot_tracks(result.clip, report.feet);
-  report.foot_slide_before_cm_s = foot_slide_cm_s(tracks, contacts);
-  report.foot_slide_after_cm_s = foot_slide_cm_s(after, contacts);
+// Hands over the clip part by part: as it was, as it is. A long clip is not held twice.
+void for_each_part(const LegTracks& before, const Clip& now,
+                   const std::function<void(const Clip& was, const Clip& is)>& visit) {
+  constexpr int part_frames = 4096;
+  for (int first = 0; first < now.frames; first += part_frames) {
+    const int count = std::min(part_frames, now.frames - first);
+    visit(before.slice_before(now, first, count), slice(now, first, count));
+  }
+}
+
+double largest_move_since(const LegTracks& before, const Clip& now) {
+  double largest = 0;
+  for_each_part(before, now,
+                [&](const Clip& was, const Clip& is) { largest = std::max(largest, largest_move_cm(was, is)); });
+  return largest;
+}
+
+double mean_pose_change_since(const LegTracks& before, const Clip& now) {
+  double sum = 0;
+  for_each_part(before, now, [&](const Clip& was, const Clip& is) { sum += mean_pose_change_cm(was, is) * is.frames; });
+  return sum / now.frames;
+}
+
+double deepest_cm(const FootTracks& tracks, const CleanReport& report) {
+  double deepest = 0;
   for (int leg = 0; leg < 2; ++leg) {
-    const FloorUnder floor(after, report.ground, report.plants, leg);
+    const FloorUnder floor(tracks, report.ground, report.plants, leg);
     for (int slot = 2 * leg; slot < 2 * leg + 2; ++slot) {
-      for (int f = 0; f < after.frames && after.has(slot); ++f) {
-        const Vector3d& p = after.at[slot][f];
-        report.floor_penetration_cm = std::max(report.floor_penetration_cm, floor.at(p, f) - p.y());
+      for (int f = 0; f < tracks.frames && tracks.has(slot); ++f) {
+        const Vector3d& p = tracks.at[slot][f];
+        deepest = std::max(deepest, floor.at(p, f) - p.y());
       }
     }
   }
-  report.mean_pose_change_cm = mean_pose_change_cm(before, result.clip);
-  report.largest_move_cm = largest_move_cm(before, result.clip);
-  const double was = largest_acceleration_cm_s2(before);
-  report.acceleration_ratio = was > 0 ? largest_acceleration_cm_s2(result.clip) / was : 1;
+  return deepest;
+}
+
+// What there is to say of a cleaned clip; `acceleration_before`: the largest of the clip as it was.
+void measure(const LegTracks& before, double acceleration_before, const FootContacts& contacts, CleanResult& result) {
+  CleanReport& report = result.report;
+  const FootTracks after = foot_tracks(result.clip, report.feet);
+  report.foot_slide_after_cm_s = foot_slide_cm_s(after, contacts);
+  report.floor_penetration_cm = deepest_cm(after, report);
+  report.mean_pose_change_cm = mean_pose_change_since(before, result.clip);
+  report.largest_move_cm = largest_move_since(before, result.clip);
+  report.acceleration_ratio =
+      acceleration_before > 0 ? largest_acceleration_cm_s2(result.clip) / acceleration_before : 1;
+}
+
+// Cleans once. False when that would move nothing by more than matters: then nothing is changed.
+bool clean_once(FootTracks tracks, const Ground& ground, std::vector<Plant> plants, bool first, CleanResult& result) {
+  const LegGoals goals = goals_for(tracks, ground, plants);
+  tracks = {};  // of a long clip as large as what else is held of it
+  const LegTracks before(result.clip, result.report.feet);
+  pose_legs(result.clip, result.report.feet, goals);
+  const bool settled = largest_move_since(before, result.clip) <= settled_cm;
+  if (settled && !first) {
+    before.put_back(result.clip);
+    return false;
+  }
+  result.report.plants = std::move(plants);
+  ++result.report.passes;
+  return !settled;
 }
 
 }  // namespace
@@ -143,29 +190,27 @@ std::vector<std::string> doubts_about(const CleanReport& report) {
   return out;
 }
 
-CleanResult clean(const Clip& clip, const CleanOptions& options) {
+CleanResult clean(Clip clip, const CleanOptions& options) {
   options.validate();
-  CleanResult out{.clip = clip, .report = {}};
-  out.report.feet = require_feet(clip, options.feet);
-  const FootTracks first = foot_tracks(clip, out.report.feet);
-  FootTracks tracks = first;
-  out.report.ground = ground_for(tracks, options);
-  const FootContacts contacts = contacts_for(tracks, out.report.ground, options);
-  check_contacts(clip, tracks, contacts);
-  for (int pass = 0; pass < options.passes; ++pass) {
-    const Ground ground = ground_for(tracks, options);
-    std::vector<Plant> plants =
-        place_plants(tracks, ground, pass == 0 ? contacts : contacts_for(tracks, ground, options));
-    Clip posed = pose_legs(out.clip, out.report.feet, goals_for(tracks, ground, plants));
-    const bool settled = largest_move_cm(out.clip, posed) <= settled_cm;
-    if (pass > 0 && settled) break;
-    out.clip = std::move(posed);
-    out.report.plants = std::move(plants);
-    out.report.passes = pass + 1;
-    if (settled) break;
-    tracks = foot_tracks(out.clip, out.report.feet);
+  CleanResult out{.clip = std::move(clip), .report = {}};
+  CleanReport& report = out.report;
+  report.feet = require_feet(out.clip, options.feet);
+  FootTracks tracks = foot_tracks(out.clip, report.feet);
+  report.ground = ground_for(tracks, options);
+  const FootContacts contacts = contacts_for(tracks, report.ground, options);
+  check_contacts(out.clip, tracks, contacts);
+  report.foot_slide_before_cm_s = foot_slide_cm_s(tracks, contacts);
+  const double acceleration = largest_acceleration_cm_s2(out.clip);
+  const LegTracks before(out.clip, report.feet);
+  std::vector<Plant> plants = place_plants(tracks, report.ground, contacts);
+  Ground ground = report.ground;
+  while (clean_once(std::move(tracks), ground, std::move(plants), report.passes == 0, out) &&
+         report.passes < options.passes) {
+    tracks = foot_tracks(out.clip, report.feet);
+    ground = ground_for(tracks, options);
+    plants = place_plants(tracks, ground, contacts_for(tracks, ground, options));
   }
-  measure(clip, first, contacts, out);
+  measure(before, acceleration, contacts, out);
   return out;
 }
 

@@ -58,6 +58,6 @@ struct CleanResult {
 [[nodiscard]] std::vector<std::string> doubts_about(const CleanReport& report);
 
 // Throws Error{bad_input} when no feet are found or a given contact is outside the clip.
-[[nodiscard]] CleanResult clean(const Clip& clip, const CleanOptions& options = {});
+[[nodiscard]] CleanResult clean(Clip clip, const CleanOptions& options = {});
 
 }  // namespace kinespace

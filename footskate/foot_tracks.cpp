@@ -3,17 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+
+#include "motion/position_blocks.h"
 
 namespace kinespace {
 namespace {
-
-Path path_of(const JointPositions& positions, int joint) {
-  Path out;
-  if (joint < 0) return out;
-  out.reserve(positions.frames);
-  for (int f = 0; f < positions.frames; ++f) out.push_back(positions.at(f, joint));
-  return out;
-}
 
 // A body with its left hip at +X of its right one faces +Z: heading 0.
 std::vector<double> headings(const Path& left, const Path& right) {
@@ -38,15 +33,21 @@ Eigen::Vector3d FootTracks::velocity(const Path& path, int frame) const {
 }
 
 FootTracks foot_tracks(const Clip& clip, const Feet& feet) {
-  const JointPositions positions = joint_positions(clip);
   FootTracks out{.feet = feet, .frames = clip.frames, .rate_hz = clip.rate_hz};
   const auto joints = feet.foot_joints();
-  for (std::size_t slot = 0; slot < joints.size(); ++slot) out.at[slot] = path_of(positions, joints[slot]);
+  std::vector<std::pair<int, Path*>> paths = {{feet.root, &out.root}};
+  for (std::size_t slot = 0; slot < joints.size(); ++slot) paths.emplace_back(joints[slot], &out.at[slot]);
   for (std::size_t side = 0; side < 2; ++side) {
-    out.hip[side] = path_of(positions, feet.legs[side].hip);
-    out.knee[side] = path_of(positions, feet.legs[side].knee);
+    paths.emplace_back(feet.legs[side].hip, &out.hip[side]);
+    paths.emplace_back(feet.legs[side].knee, &out.knee[side]);
   }
-  out.root = path_of(positions, feet.root);
+  std::erase_if(paths, [](const auto& path) { return path.first < 0; });
+  for (auto& [joint, path] : paths) path->reserve(clip.frames);
+  for_each_position_block(clip, 0, [&](int, const JointPositions& positions) {
+    for (auto& [joint, path] : paths) {
+      for (int f = 0; f < positions.frames; ++f) path->push_back(positions.at(f, joint));
+    }
+  });
   out.heading = headings(out.hip[0], out.hip[1]);
   return out;
 }

@@ -1,5 +1,7 @@
 #include "footskate/leg_pose.h"
 
+#include <algorithm>
+
 #include "footskate/two_bone_ik.h"
 #include "motion/kinematics.h"
 
@@ -79,17 +81,54 @@ Vector3d mean_knee_axis(const Clip& clip, const Leg& leg) {
   return sum.norm() > 1e-9 ? sum.normalized() : Vector3d::Zero();
 }
 
-Clip pose_legs(const Clip& clip, const Feet& feet, const LegGoals& goals) {
-  Clip out = clip;
-  shift_root(out, feet, goals.root_shift);
-  std::array<LegPoser, 2> posers = {LegPoser(out, feet.legs[0]), LegPoser(out, feet.legs[1])};
+void pose_legs(Clip& clip, const Feet& feet, const LegGoals& goals) {
+  shift_root(clip, feet, goals.root_shift);
+  std::array<LegPoser, 2> posers = {LegPoser(clip, feet.legs[0]), LegPoser(clip, feet.legs[1])};
   std::vector<JointFrame> world;
   for (int f = 0; f < clip.frames; ++f) {
-    world_frames(out, f, world);
+    world_frames(clip, f, world);
     for (int side = 0; side < 2; ++side) {
       posers[side].pose(f, goals.sides[side].ankle[f], goals.sides[side].foot_turn[f], world);
     }
   }
+}
+
+LegTracks::LegTracks(const Clip& clip, const Feet& feet)
+    : joints_{feet.legs[0].hip, feet.legs[0].knee, feet.legs[0].ankle,
+              feet.legs[1].hip, feet.legs[1].knee, feet.legs[1].ankle},
+      root_joint_(feet.root) {
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const auto track = clip.rotation_track(joints_[i]);
+    rotations_[i].assign(track.begin(), track.end());
+  }
+  if (const auto* track = clip.translation_track(root_joint_)) root_ = track->values;
+}
+
+void LegTracks::put_back(Clip& clip) const {
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    std::ranges::copy(rotations_[i], clip.rotation_track(joints_[i]).begin());
+  }
+  if (root_.empty()) {
+    std::erase_if(clip.translations, [&](const auto& track) { return track.joint == root_joint_; });
+  } else {
+    clip.require_translation_track(root_joint_).values = root_;
+  }
+}
+
+Clip LegTracks::slice_before(const Clip& now, int first, int count) const {
+  Clip out = slice(now, first, count);
+  const LegTracks part = sliced(first, count);
+  part.put_back(out);
+  return out;
+}
+
+LegTracks LegTracks::sliced(int first, int count) const {
+  LegTracks out = LegTracks(joints_, root_joint_);
+  for (std::size_t i = 0; i < joints_.size(); ++i) {
+    const auto from = rotations_[i].begin() + 4 * static_cast<std::ptrdiff_t>(first);
+    out.rotations_[i].assign(from, from + 4 * static_cast<std::ptrdiff_t>(count));
+  }
+  if (!root_.empty()) out.root_.assign(root_.begin() + first, root_.begin() + first + count);
   return out;
 }
 

@@ -63,26 +63,6 @@ std::vector<Vector3d> smoothest_of_all(std::span<const Pull> pulls, double rate_
   return out;
 }
 
-// The same. The equations of a long clip take kilobytes a frame, so they are solved part by part, each with so much to
-// both sides that what lies beyond moves it by less than 1e-9 of its shift: an influence falls to a tenth in 0.7 s.
-std::vector<Vector3d> smoothest(std::span<const Pull> pulls, double rate_hz) {
-  constexpr std::size_t ordinary_frames = 10'000;
-  constexpr std::size_t part_frames = 8192;
-  if (pulls.size() <= ordinary_frames) return smoothest_of_all(pulls, rate_hz);
-  const auto margin = static_cast<std::size_t>(std::ceil(8 * rate_hz));
-  std::vector<Vector3d> out;
-  out.reserve(pulls.size());
-  for (std::size_t first = 0; first < pulls.size(); first += part_frames) {
-    const std::size_t last = std::min(pulls.size(), first + part_frames);
-    const std::size_t from = first - std::min(first, margin);
-    const std::size_t to = std::min(pulls.size(), last + margin);
-    const std::vector<Vector3d> part = smoothest_of_all(pulls.subspan(from, to - from), rate_hz);
-    out.insert(out.end(), part.begin() + static_cast<std::ptrdiff_t>(first - from),
-               part.begin() + static_cast<std::ptrdiff_t>(last - from));
-  }
-  return out;
-}
-
 class RootPath {
  public:
   RootPath(const FootTracks& tracks, const std::array<FootTask, 2>& tasks) : t_(tracks), tasks_(tasks) {
@@ -92,25 +72,46 @@ class RootPath {
   std::vector<Vector3d> solve() {
     std::vector<Vector3d> shift(t_.frames, Vector3d::Zero());
     for (int round = 0; round < rounds; ++round) {
-      shift = smoothest(pulls(shift), t_.rate_hz);
+      shift = smoothest(shift);
       mark_stretched(shift);
     }
     return shift;
   }
 
  private:
-  [[nodiscard]] std::vector<Pull> pulls(const std::vector<Vector3d>& shift) const {
-    std::vector<Pull> out(t_.frames);
+  // The equations of a long clip take kilobytes a frame, so they are solved part by part, each with so much to both
+  // sides that what lies beyond moves it by less than 1e-9 of its shift: an influence falls to a tenth in 0.7 s.
+  [[nodiscard]] std::vector<Vector3d> smoothest(const std::vector<Vector3d>& shift) const {
+    constexpr int ordinary_frames = 10'000;
+    constexpr int part_frames = 8192;
+    if (t_.frames <= ordinary_frames) return smoothest_of_all(pulls(shift, 0, t_.frames), t_.rate_hz);
+    const int margin = static_cast<int>(std::ceil(8 * t_.rate_hz));
+    std::vector<Vector3d> out;
+    out.reserve(shift.size());
+    for (int first = 0; first < t_.frames; first += part_frames) {
+      const int last = std::min(t_.frames, first + part_frames);
+      const int from = std::max(0, first - margin);
+      const int to = std::min(t_.frames, last + margin);
+      const std::vector<Vector3d> part = smoothest_of_all(pulls(shift, from, to), t_.rate_hz);
+      out.insert(out.end(), part.begin() + (first - from), part.begin() + (last - from));
+    }
+    return out;
+  }
+
+  // Of the frames [from, to).
+  [[nodiscard]] std::vector<Pull> pulls(const std::vector<Vector3d>& shift, int from, int to) const {
+    std::vector<Pull> out(to - from);
     for (int leg = 0; leg < 2; ++leg) {
-      for (int f = 0; f < t_.frames; ++f) {
+      for (int f = from; f < to; ++f) {
         if (tasks_[leg].planted[f] == 0) continue;
         const Vector3d way = way_after(leg, f, shift);
         const Vector3d along = way.normalized();
         const Matrix3d axis = along * along.transpose();
         const double keep = along_leg * straightness(leg, f);
-        out[f].add(Matrix3d::Identity(), tasks_[leg].displacement[f]);
-        out[f].add(keep * axis, shift[f] + along * (way.norm() - reach(leg, f)));
-        if (over_[leg][f] != 0) out[f].add(stretched * axis, shift[f] + along * (way.norm() - limit(leg, f)));
+        Pull& pull = out[f - from];
+        pull.add(Matrix3d::Identity(), tasks_[leg].displacement[f]);
+        pull.add(keep * axis, shift[f] + along * (way.norm() - reach(leg, f)));
+        if (over_[leg][f] != 0) pull.add(stretched * axis, shift[f] + along * (way.norm() - limit(leg, f)));
       }
     }
     return out;

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "footskate/contact_model.h"
-#include "motion/kinematics.h"
+#include "motion/position_blocks.h"
 
 namespace kinespace {
 
@@ -54,21 +54,24 @@ double mean_pose_change_cm(const Clip& before, const Clip& after) {
 
 double largest_move_cm(const Clip& before, const Clip& after) {
   assert(before.frames == after.frames && before.skeleton.joint_count() == after.skeleton.joint_count());
-  const JointPositions a = joint_positions(before);
-  const JointPositions b = joint_positions(after);
   double largest = 0;
-  for (std::size_t i = 0; i < a.values.size(); ++i) largest = std::max(largest, (a.values[i] - b.values[i]).norm());
+  JointPositions b;
+  for_each_position_block(before, 0, [&](int first, const JointPositions& a) {
+    positions_of_frames(after, first, a.frames, b);
+    for (std::size_t i = 0; i < a.values.size(); ++i) largest = std::max(largest, (a.values[i] - b.values[i]).norm());
+  });
   return largest;
 }
 
 double largest_acceleration_cm_s2(const Clip& clip) {
-  const JointPositions p = joint_positions(clip);
   double largest = 0;
-  for (int f = 1; f + 1 < clip.frames; ++f) {
-    for (int j = 0; j < p.joints; ++j) {
-      largest = std::max(largest, (p.at(f + 1, j) - 2 * p.at(f, j) + p.at(f - 1, j)).norm());
+  for_each_position_block(clip, 2, [&](int, const JointPositions& p) {
+    for (int f = 1; f + 1 < p.frames; ++f) {
+      for (int j = 0; j < p.joints; ++j) {
+        largest = std::max(largest, (p.at(f + 1, j) - 2 * p.at(f, j) + p.at(f - 1, j)).norm());
+      }
     }
-  }
+  });
   return largest * clip.rate_hz * clip.rate_hz;
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/pages.h"
+
 namespace kinespace {
 namespace {
 
@@ -105,11 +107,12 @@ void interpolate(const SideTrack& track, int frame, std::size_t& piece, double* 
   }
 }
 
-void apply_side_track(const SideTrack& track, Clip& clip) {
+// `clip` begins at frame `first` of the track.
+void apply_side_track(const SideTrack& track, int first, Clip& clip) {
   std::size_t piece = 0;
   double v[4];
   for (int f = 0; f < clip.frames; ++f) {
-    interpolate(track, f, piece, v);
+    interpolate(track, first + f, piece, v);
     if (track.dimensions == 3) {
       clip.require_translation_track(track.joint).values[static_cast<std::size_t>(f)] = {v[0], v[1], v[2]};
     } else {
@@ -139,50 +142,83 @@ double heading_of(const Eigen::Quaterniond& q) {
   return angle;
 }
 
-ClipCurves clip_curves(const Clip& clip) {
+namespace {
+
+constexpr int frames_at_a_time = 65536;
+
+// The curves block by block of frames; `done` hears of each.
+template <typename Done>
+ClipCurves make_curves(const Clip& clip, const Done& done) {
   const CurveLayout layout = curve_layout(clip.skeleton);
   const int root = layout.joints.front();
   const std::vector<int> above = ancestors_of(clip.skeleton, root);
 
   ClipCurves out{.name = clip.name, .rate_hz = clip.rate_hz, .values = SampleMatrix(clip.frames, layout.curve_count())};
-  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
-  for (int f = 0; f < clip.frames; ++f) {
-    const RigidMotion base = compose(clip, above, f);
-    const Eigen::Vector3d position = base.position + base.rotation * clip.translation(root, f);
-    const Eigen::Quaterniond rotation = base.rotation * clip.rotation(root, f);
-    if (f == 0) {
-      out.placement = {position, heading_of(rotation)};
-      turn = Eigen::AngleAxisd(-out.placement.heading_rad, Eigen::Vector3d::UnitY());
-    }
-    const Eigen::Quaterniond q = turn * rotation;
-    out.values.row(f).head<3>() = (turn * (position - out.placement.start_cm) / cm_per_metre).transpose();
-    out.values.row(f).segment<4>(3) << q.w(), q.x(), q.y(), q.z();
-  }
-  for (int k = 1; k < layout.joint_count(); ++k) {
-    const auto track = clip.rotation_track(layout.joints[static_cast<std::size_t>(k)]);
-    out.values.middleCols(3 + 4 * k, 4) =
-        Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor>>(track.data(), clip.frames, 4);
-  }
-  for (int k = 0; k < layout.joint_count(); ++k) make_continuous(out.values, 3 + 4 * k);
-
   for (const int j : above) add_rotation_side_track(clip, j, out.side_tracks);
   for (const auto& track : clip.translations) {
     if (track.joint != root) out.side_tracks.push_back(translation_side_track(track));
   }
+
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  for (int first = 0; first < clip.frames; first += frames_at_a_time) {
+    const int count = std::min(frames_at_a_time, clip.frames - first);
+    for (int f = first; f < first + count; ++f) {
+      const RigidMotion base = compose(clip, above, f);
+      const Eigen::Vector3d position = base.position + base.rotation * clip.translation(root, f);
+      const Eigen::Quaterniond rotation = base.rotation * clip.rotation(root, f);
+      if (f == 0) {
+        out.placement = {position, heading_of(rotation)};
+        turn = Eigen::AngleAxisd(-out.placement.heading_rad, Eigen::Vector3d::UnitY());
+      }
+      const Eigen::Quaterniond q = turn * rotation;
+      out.values.row(f).head<3>() = (turn * (position - out.placement.start_cm) / cm_per_metre).transpose();
+      out.values.row(f).segment<4>(3) << q.w(), q.x(), q.y(), q.z();
+    }
+    for (int k = 1; k < layout.joint_count(); ++k) {
+      const auto track = clip.rotation_track(layout.joints[static_cast<std::size_t>(k)]);
+      out.values.block(first, 3 + 4 * k, count, 4) =
+          Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor>>(
+              track.data() + 4 * static_cast<std::size_t>(first), count, 4);
+    }
+    done(first, count);
+  }
+  for (int k = 0; k < layout.joint_count(); ++k) make_continuous(out.values, 3 + 4 * k);
+  return out;
+}
+
+}  // namespace
+
+ClipCurves clip_curves(const Clip& clip) {
+  return make_curves(clip, [](int, int) {});
+}
+
+ClipCurves clip_curves(Clip&& clip) {
+  ClipCurves out = make_curves(clip, [&clip](int first, int count) {
+    for (int j = 0; j < clip.skeleton.joint_count(); ++j) {
+      discard_pages(
+          clip.rotation_track(j).subspan(4 * static_cast<std::size_t>(first), 4 * static_cast<std::size_t>(count)));
+    }
+  });
+  clip = {};
   return out;
 }
 
 Clip clip_from_curves(const ClipCurves& curves, const Skeleton& skeleton) {
+  return clip_of_frames(curves, curves.values, 0, skeleton);
+}
+
+Clip clip_of_frames(const ClipCurves& curves, const Eigen::Ref<const SampleMatrix>& rows, int first,
+                    const Skeleton& skeleton) {
   const CurveLayout layout = curve_layout(skeleton);
   const int root = layout.joints.front();
   const std::vector<int> above = ancestors_of(skeleton, root);
-  Clip clip = make_clip(curves.name, skeleton, curves.rate_hz, curves.frames());
-  for (const SideTrack& track : curves.side_tracks) apply_side_track(track, clip);
+  Clip clip = make_clip(curves.name, skeleton, curves.rate_hz, static_cast<int>(rows.rows()));
+  for (const SideTrack& track : curves.side_tracks) apply_side_track(track, first, clip);
 
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(curves.placement.heading_rad, Eigen::Vector3d::UnitY()));
   auto& travel = clip.require_translation_track(root);
   for (int f = 0; f < clip.frames; ++f) {
-    const auto row = curves.values.row(f);
+    const auto row = rows.row(f);
     const Eigen::Vector3d position =
         curves.placement.start_cm + turn * Eigen::Vector3d(row.head<3>().transpose() * cm_per_metre);
     const Eigen::Quaterniond rotation = turn * Eigen::Quaterniond(row(3), row(4), row(5), row(6)).normalized();
@@ -193,7 +229,7 @@ Clip clip_from_curves(const ClipCurves& curves, const Skeleton& skeleton) {
   for (int k = 1; k < layout.joint_count(); ++k) {
     const int joint = layout.joints[static_cast<std::size_t>(k)];
     for (int f = 0; f < clip.frames; ++f) {
-      const auto q = curves.values.row(f).segment<4>(3 + 4 * k);
+      const auto q = rows.row(f).segment<4>(3 + 4 * k);
       clip.set_rotation(joint, f, Eigen::Quaterniond(q(0), q(1), q(2), q(3)).normalized());
     }
   }

@@ -57,10 +57,16 @@ struct ClipCurves {
 
 // Side tracks keep to these: 1e-4 cm for translations, 1e-7 for quaternions.
 [[nodiscard]] ClipCurves clip_curves(const Clip& clip);
+// The same of a clip that is needed no more: the memory of a long one goes as its curves come, so that it never takes
+// twice its size.
+[[nodiscard]] ClipCurves clip_curves(Clip&& clip);
 
 // The way back; quaternions are renormalised. `skeleton` must be that of the clip (or one of the same tree: the motion
 // on other bones).
 [[nodiscard]] Clip clip_from_curves(const ClipCurves& curves, const Skeleton& skeleton);
+// A part of it, from frame `first` on: `rows` stand for the values of those frames, all else is that of `curves`.
+[[nodiscard]] Clip clip_of_frames(const ClipCurves& curves, const Eigen::Ref<const SampleMatrix>& rows, int first,
+                                  const Skeleton& skeleton);
 
 // The heading of an orientation: the angle of its twist about +Y (swing-twist), in (-pi, pi]; 0 where it has none.
 [[nodiscard]] double heading_of(const Eigen::Quaterniond& q);

@@ -152,12 +152,8 @@ EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std
   return out;
 }
 
-ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n, const JoinOptions& options) {
-  ClipCurves out{.name = clip.name,
-                 .rate_hz = clip.rate_hz,
-                 .placement = clip.placement,
-                 .values = SampleMatrix(clip.frames, space.curves()),
-                 .side_tracks = clip.side_tracks};
+void decode_in_parts(const MotionSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
+                     const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit) {
   for (const EncodedRun& run : clip.runs) {
     // Two sequences at a time: positions of the root in metres from the clip's start, and quaternions.
     Eigen::Vector3d start = run.start.cast<double>();
@@ -167,15 +163,28 @@ ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n, cons
       SampleMatrix frames = i == 0 ? decode_frames(space, run.sequences[i], start, clip.rate_hz, n) : std::move(next);
       start += run.sequences[i].travel.cast<double>();
       std::optional<CutCorrection> after;
-      if (i + 1 < run.sequences.size()) {
+      const bool last = i + 1 == run.sequences.size();
+      if (!last) {
         next = decode_frames(space, run.sequences[i + 1], start, clip.rate_hz, n);
         after = cut_correction(frames, next, options.free_change);
       }
       join(frames, before ? &*before : nullptr, after ? &*after : nullptr, options);
-      out.values.middleRows(run.sequences[i].first, frames.rows()) = frames;
+      // The frame that two share is the later one's.
+      visit(run.sequences[i].first, frames.topRows(last ? frames.rows() : frames.rows() - 1));
       before = std::move(after);
     }
   }
+}
+
+ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n, const JoinOptions& options) {
+  ClipCurves out{.name = clip.name,
+                 .rate_hz = clip.rate_hz,
+                 .placement = clip.placement,
+                 .values = SampleMatrix(clip.frames, space.curves()),
+                 .side_tracks = clip.side_tracks};
+  decode_in_parts(space, clip, n, options, [&out](int first, const Eigen::Ref<const SampleMatrix>& rows) {
+    out.values.middleRows(first, rows.rows()) = rows;
+  });
   return out;
 }
 

@@ -5,6 +5,7 @@
 // inside, the excess is taken out, both by corrections that fade within `blend` of a sequence.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -83,6 +84,11 @@ class RunSampler {
 // With the first n functions (all when n < 0).
 [[nodiscard]] ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n = -1,
                                 const JoinOptions& options = {});
+
+// The same, sequence by sequence, for what must not hold all of a long clip: hands over the first frame and the values
+// of the frames from there on (ClipCurves::values), every frame once, ascending.
+void decode_in_parts(const MotionSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
+                     const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit);
 
 // A clip outside the library, into the space: curves, sides, cuts, vectors. Throws Error{bad_input} for another
 // skeleton.

@@ -22,7 +22,7 @@ namespace kinespace {
 namespace {
 
 constexpr int clips_per_block = 16;
-constexpr int importer_version = 1;  // raise it when imports of the same file would come out otherwise
+constexpr int importer_version = 2;  // raise it when imports of the same file would come out otherwise
 
 // Everything that an import depends on besides its file.
 std::string fingerprint_of(const LibraryBuilderOptions& options) {
@@ -40,20 +40,41 @@ struct Import {
   std::vector<Doubt> doubts;
 };
 
+// Part 0 is kept under the hash itself, and last: where it is, the others are.
+std::string part_key(const std::string& source_hash, int part) {
+  return part == 0 ? source_hash : fmt::format("{} part {}", source_hash, part);
+}
+
+PreparedClip kept_import(const Import& import, const LibraryBuild& build) {
+  const auto part_of = [&](int part) {
+    auto bytes = build.find_import(part_key(import.source_hash, part));
+    if (!bytes) {
+      throw Error(ErrorKind::machine, {.file = import.file.string(),
+                                       .found = "its import is gone",
+                                       .expected = "the partial library to stay",
+                                       .remedy = "build again"});
+    }
+    return *std::move(bytes);
+  };
+  return unpack_prepared(part_of, import.file.string());
+}
+
 // Reads a file unless an earlier build did, and keeps what came of it. True when it was there already.
 bool import_file(Import& import, const LibraryBuilderOptions& options, LibraryBuild& build) {
   import.source_hash = source_hash_of(import.file, options.asf);
-  if (const auto known = build.find_import(import.source_hash)) {
-    const PreparedClip clip = unpack_prepared(*known, import.file.string());
+  if (build.find_import(import.source_hash)) {
+    const PreparedClip clip = kept_import(import, build);
     import.tree_hash = clip.skeleton.tree_hash();
     import.doubts = doubts_about(clip_from_curves(clip.curves, clip.skeleton));
     return true;
   }
-  const Clip read = read_clip(import.file, options.asf);
+  Clip read = read_clip(import.file, options.asf);
   import.doubts = doubts_about(read);
-  const PreparedClip clip = prepare(read, options.space.sequences);
+  const PreparedClip clip = prepare(std::move(read), options.space.sequences);
   import.tree_hash = clip.skeleton.tree_hash();
-  build.keep_import(import.source_hash, pack_prepared(clip));
+  for (int part = prepared_parts(clip); part-- > 0;) {
+    build.keep_import(part_key(import.source_hash, part), pack_prepared(clip, part));
+  }
   return false;
 }
 
@@ -98,39 +119,47 @@ std::vector<std::string> doubts_of(const std::vector<Import>& imports) {
 PreparedSource source_of_imports(const std::vector<const Import*>& imports, const LibraryBuild& build) {
   return {static_cast<int>(imports.size()), [&imports, &build](int i) {
             const Import& import = *imports[static_cast<std::size_t>(i)];
-            const auto bytes = build.find_import(import.source_hash);
-            if (!bytes) {
-              throw Error(ErrorKind::machine, {.file = import.file.string(),
-                                               .found = "its import is gone",
-                                               .expected = "the partial library to stay",
-                                               .remedy = "build again"});
-            }
-            PreparedClip clip = unpack_prepared(*bytes, import.file.string());
+            PreparedClip clip = kept_import(import, build);
             clip.curves.name = import.name;
             return clip;
           }};
 }
 
-// What the library gives back: scores and tracks in the steps that they are stored in.
-EncodedClip as_stored(const EncodedClip& clip, const MotionSpace& space, const Skeleton& skeleton) {
-  return unpack_clip(pack_clip(clip, space), space, skeleton,
-                     {.name = clip.name, .rate_hz = clip.rate_hz, .frames = clip.frames}, clip.name);
-}
+// Of the joints of two clips, part by part.
+class JointDistance {
+ public:
+  void add(const JointPositions& a, const JointPositions& b) {
+    for (std::size_t i = 0; i < a.values.size(); ++i) {
+      const double e = (a.values[i] - b.values[i]).norm();
+      sum_ += e;
+      worst_ = std::max(worst_, e);
+    }
+    count_ += a.values.size();
+  }
+  [[nodiscard]] MeasuredError error() const {
+    return {.mean_joint_error_cm = sum_ / static_cast<double>(count_), .max_joint_error_cm = worst_};
+  }
+
+ private:
+  double sum_ = 0;
+  double worst_ = 0;
+  std::size_t count_ = 0;
+};
 
 MeasuredError distance(const JointPositions& a, const JointPositions& b) {
-  double sum = 0;
-  double worst = 0;
-  for (std::size_t i = 0; i < a.values.size(); ++i) {
-    const double e = (a.values[i] - b.values[i]).norm();
-    sum += e;
-    worst = std::max(worst, e);
-  }
-  return {.mean_joint_error_cm = sum / static_cast<double>(a.values.size()), .max_joint_error_cm = worst};
+  JointDistance out;
+  out.add(a, b);
+  return out.error();
 }
 
 MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, const EncodedClip& encoded) {
-  return distance(joint_positions(clip_from_curves(clip.curves, clip.skeleton)),
-                  joint_positions(clip_from_curves(decode(space, encoded), clip.skeleton)));
+  JointDistance out;
+  decode_in_parts(space, encoded, -1, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
+    const auto original = clip.curves.values.middleRows(first, rows.rows());
+    out.add(joint_positions(clip_of_frames(clip.curves, original, first, clip.skeleton)),
+            joint_positions(clip_of_frames(clip.curves, rows, first, clip.skeleton)));
+  });
+  return out.error();
 }
 
 // What a space does with the clips of one joint tree.
@@ -172,7 +201,8 @@ class SpaceWriter {
     built_.space.apply_references(prepared.curves.values);
     out.clip =
         encode(built_.space, prepared.curves, prepared.runs, built_.warps[static_cast<std::size_t>(index)], compute_);
-    out.clip.error = measure_error(prepared, built_.space, as_stored(out.clip, built_.space, prepared.skeleton));
+    round_to_stored(out.clip);
+    out.clip.error = measure_error(prepared, built_.space, out.clip);
     out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
     return out;
@@ -221,9 +251,9 @@ void transfer_clips(Library& library, std::int64_t space_id, const MotionSpace& 
     for (EncodedRun& run : clip.runs) {
       for (EncodedSequence& s : run.sequences) s.scores = to.transfer(s.scores, from);
     }
+    round_to_stored(clip);
     // Its own curves are not there any more; with what the transfer moves added, its error is never less than it is.
-    const MeasuredError moved =
-        distance(before, joint_positions(clip_from_curves(decode(to, as_stored(clip, to, skeleton)), skeleton)));
+    const MeasuredError moved = distance(before, joint_positions(clip_from_curves(decode(to, clip), skeleton)));
     clip.error.mean_joint_error_cm += moved.mean_joint_error_cm;
     clip.error.max_joint_error_cm += moved.max_joint_error_cm;
     const std::vector<float> old_vector = library.retrieval_vector(row.id);

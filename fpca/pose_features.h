@@ -29,6 +29,29 @@ struct PoseFeatureOptions {
   double hip_weight = 0.5;   // b_0
 };
 
+// The features of any keyframes of a clip, as those of all of them are.
+class PoseFeatureSource {
+ public:
+  // `curves` must outlive it.
+  PoseFeatureSource(const ClipCurves& curves, const Skeleton& skeleton, const PoseFeatureOptions& options = {});
+  PoseFeatureSource(ClipCurves&&, const Skeleton&, const PoseFeatureOptions& = {}) = delete;
+
+  [[nodiscard]] int rows() const { return rows_; }
+  [[nodiscard]] int dims() const { return 6 * static_cast<int>(weight_.size()); }
+  // Keyframes [first, first + count), appended.
+  void append(int first, int count, std::vector<float>& out) const;
+
+ private:
+  [[nodiscard]] SampleMatrix keyframes(int first, int count) const;
+  void write(const SampleMatrix& keys, int first_key, int row, float* out) const;
+
+  const ClipCurves& curves_;
+  double step_;  // frames from one keyframe to the next
+  int rows_;
+  double root_weight_;
+  std::vector<double> weight_;  // by joint
+};
+
 [[nodiscard]] PoseFeatures pose_features(const ClipCurves& curves, const Skeleton& skeleton,
                                          const PoseFeatureOptions& options = {});
 [[nodiscard]] PoseFeatures pose_features(const Clip& clip, const PoseFeatureOptions& options = {});

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
@@ -15,12 +17,14 @@ namespace kinespace {
 namespace {
 
 constexpr int clips_per_sum = 16;  // fixed, so that sums do not depend on threads
+// As many sequences of a clip are in memory together: a quarter of an hour.
+constexpr std::size_t sequences_per_block = 1024;
 
 // Loads every clip once, block by block and the clips of a block in parallel, and hands each to `work` (in parallel)
-// and then to `gather` (one at a time, in order).
+// and then to `gather` (one at a time, in order). The clip is the work's own, to change.
 template <typename Result>
 void for_each_clip(const PreparedSource& clips, const Progress& progress, std::string_view stage,
-                   const std::function<Result(int, const PreparedClip&)>& work,
+                   const std::function<Result(int, PreparedClip&)>& work,
                    const std::function<void(int, Result&)>& gather) {
   for (int start = 0; start < clips.count; start += clips_per_sum) {
     progress.check_stop();
@@ -28,7 +32,7 @@ void for_each_clip(const PreparedSource& clips, const Progress& progress, std::s
     const int count = std::min(clips_per_sum, clips.count - start);
     std::vector<std::optional<Result>> results(static_cast<std::size_t>(count));
     tbb::parallel_for(0, count, [&](int i) {
-      const PreparedClip clip = clips.load(start + i);
+      PreparedClip clip = clips.load(start + i);
       results[static_cast<std::size_t>(i)] = work(start + i, clip);
     });
     for (int i = 0; i < count; ++i) gather(start + i, *results[static_cast<std::size_t>(i)]);
@@ -48,20 +52,18 @@ int automatic_points(int longest_sequence) {
   return std::max(48, longest_sequence + 12);
 }
 
-// Samples of all sequences of a clip under its warps.
-std::vector<SampleMatrix> clip_samples(const MotionSpace& space, const PreparedClip& clip,
-                                       const std::vector<Warp>& warps) {
-  SampleMatrix values = clip.curves.values;
-  space.apply_references(values);
-  std::vector<SampleMatrix> out;
+// Hands over the samples of each sequence of a clip under its warps; the clip's curves go to the space's side.
+template <typename Visit>
+void visit_samples(const MotionSpace& space, PreparedClip& clip, const std::vector<Warp>& warps, const Visit& visit) {
+  space.apply_references(clip.curves.values);
+  std::size_t sequence = 0;
   for (const Run& run : clip.runs) {
-    const RunSampler sampler(values, run, clip.curves.rate_hz);
-    for (int i = 0; i < run.sequence_count(); ++i) {
-      const Warp warp = warps.empty() ? Warp() : warps[out.size()];
-      out.push_back(sampler.sample(run.first_frame(i), run.last_frame(i), warp, space.points()));
+    const RunSampler sampler(clip.curves.values, run, clip.curves.rate_hz);
+    for (int i = 0; i < run.sequence_count(); ++i, ++sequence) {
+      const Warp warp = warps.empty() ? Warp() : warps[sequence];
+      visit(sampler.sample(run.first_frame(i), run.last_frame(i), warp, space.points()));
     }
   }
-  return out;
 }
 
 void merge_into(std::vector<CurveMoments>& all, const std::vector<CurveMoments>& part) {
@@ -74,69 +76,51 @@ std::vector<CurveMoments> gather_moments(const PreparedSource& clips, const Moti
   std::vector<CurveMoments> all = space.empty_moments();
   for_each_clip<std::vector<CurveMoments>>(
       clips, progress, stage,
-      [&](int i, const PreparedClip& clip) {
+      [&](int i, PreparedClip& clip) {
         std::vector<CurveMoments> part = space.empty_moments();
-        const auto samples =
-            clip_samples(space, clip, warps.empty() ? std::vector<Warp>() : warps[static_cast<std::size_t>(i)]);
-        space.accumulate(samples, part, compute);
+        std::vector<SampleMatrix> samples;
+        visit_samples(space, clip, warps.empty() ? std::vector<Warp>() : warps[static_cast<std::size_t>(i)],
+                      [&](SampleMatrix&& of_sequence) {
+                        samples.push_back(std::move(of_sequence));
+                        if (samples.size() < sequences_per_block) return;
+                        space.accumulate(samples, part, compute);
+                        samples.clear();
+                      });
+        if (!samples.empty()) space.accumulate(samples, part, compute);
         return part;
       },
       [&](int, std::vector<CurveMoments>& part) { merge_into(all, part); });
   return all;
 }
 
-// Where each sequence of the library is, and what the templates are chosen by.
+// What the templates are chosen by.
 struct SequenceTable {
-  struct Entry {
-    int clip;
-    int rows;
-  };
-  std::vector<Entry> entries;
-  Eigen::MatrixXf vectors;
-  FeatureSet features;  // keyframes of each sequence
+  std::vector<int> clip;    // of each sequence
+  std::vector<int> number;  // in its clip
+  Eigen::MatrixXf vectors;  // of the first functions
 };
 
-// Keyframe features and low-order vectors of all sequences.
 SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace& space, int functions,
                                  const Progress& progress) {
-  struct Part {
-    std::vector<Eigen::VectorXf> vectors;
-    std::vector<std::vector<float>> features;
-    int dims = 0;
-  };
   SequenceTable table;
   std::vector<Eigen::VectorXf> vectors;
-  for_each_clip<Part>(
+  using Vectors = std::vector<Eigen::VectorXf>;
+  for_each_clip<Vectors>(
       clips, progress, "group",
-      [&](int, const PreparedClip& clip) {
-        Part part;
-        const PoseFeatures features = pose_features(clip.curves, clip.skeleton);
-        part.dims = features.dims;
-        const double keys_per_frame = 30.0 / clip.curves.rate_hz;
-        for (const SampleMatrix& samples : clip_samples(space, clip, {})) {
+      [&](int, PreparedClip& clip) {
+        Vectors out;
+        visit_samples(space, clip, {}, [&](const SampleMatrix& samples) {
           const ScoreMatrix scores = space.scores(samples);
           const Eigen::Index n = std::min<Eigen::Index>(functions, scores.rows());
-          part.vectors.emplace_back(Eigen::Map<const Eigen::VectorXf>(scores.data(), n * scores.cols()));
-        }
-        for (const Run& run : clip.runs) {
-          for (int i = 0; i < run.sequence_count(); ++i) {
-            const int from =
-                std::min(static_cast<int>(std::lround(run.first_frame(i) * keys_per_frame)), features.rows - 1);
-            const int to =
-                std::clamp(static_cast<int>(std::lround(run.last_frame(i) * keys_per_frame)), from, features.rows - 1);
-            part.features.emplace_back(features.values.begin() + static_cast<std::ptrdiff_t>(from) * features.dims,
-                                       features.values.begin() + static_cast<std::ptrdiff_t>(to + 1) * features.dims);
-          }
-        }
-        return part;
+          out.emplace_back(Eigen::Map<const Eigen::VectorXf>(scores.data(), n * scores.cols()));
+        });
+        return out;
       },
-      [&](int i, Part& part) {
-        table.features.dims = part.dims;
-        for (std::size_t s = 0; s < part.vectors.size(); ++s) {
-          const int rows = static_cast<int>(part.features[s].size()) / part.dims;
-          table.entries.push_back({i, rows});
-          table.features.add(part.features[s]);
-          vectors.push_back(std::move(part.vectors[s]));
+      [&](int i, Vectors& of_clip) {
+        for (std::size_t s = 0; s < of_clip.size(); ++s) {
+          table.clip.push_back(i);
+          table.number.push_back(static_cast<int>(s));
+          vectors.push_back(std::move(of_clip[s]));
         }
       });
   table.vectors.resize(static_cast<Eigen::Index>(vectors.size()), vectors.empty() ? 0 : vectors.front().size());
@@ -145,37 +129,93 @@ SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace&
   return table;
 }
 
+// Hands over the keyframe features of each sequence of a clip, in order.
+template <typename Visit>
+void visit_features(const PreparedClip& clip, const Visit& visit) {
+  const PoseFeatureSource source(clip.curves, clip.skeleton);
+  const double keys_per_frame = 30.0 / clip.curves.rate_hz;
+  std::vector<float> features;
+  for (const Run& run : clip.runs) {
+    for (int i = 0; i < run.sequence_count(); ++i) {
+      const int from = std::min(static_cast<int>(std::lround(run.first_frame(i) * keys_per_frame)), source.rows() - 1);
+      const int to =
+          std::clamp(static_cast<int>(std::lround(run.last_frame(i) * keys_per_frame)), from, source.rows() - 1);
+      features.clear();
+      source.append(from, to - from + 1, features);
+      visit(source.dims(), features);
+    }
+  }
+}
+
+// The features of the templates, by template.
+FeatureSet template_features(const PreparedSource& clips, const SequenceTable& table, const TemplateGroups& groups,
+                             const Progress& progress) {
+  std::map<int, std::vector<std::size_t>> by_clip;  // templates of each clip
+  for (std::size_t t = 0; t < groups.templates.size(); ++t) {
+    by_clip[table.clip[static_cast<std::size_t>(groups.templates[t])]].push_back(t);
+  }
+  std::vector<std::vector<float>> features(groups.templates.size());
+  FeatureSet out;
+  for (const auto& [clip, templates] : by_clip) {
+    progress.check_stop();
+    int number = 0;
+    visit_features(clips.load(clip), [&](int dims, const std::vector<float>& of_sequence) {
+      out.dims = dims;
+      for (const std::size_t t : templates) {
+        if (table.number[static_cast<std::size_t>(groups.templates[t])] == number) features[t] = of_sequence;
+      }
+      ++number;
+    });
+  }
+  for (const auto& f : features) out.add(f);
+  return out;
+}
+
 // For each sequence the warp that its group's template proposes, identity where there is none. By clip.
 std::vector<std::vector<Warp>> propose_warps(const PreparedSource& clips, const MotionSpace& space,
                                              const AlignmentOptions& options, const Compute& compute,
                                              const Progress& progress) {
   std::vector<std::vector<Warp>> out(static_cast<std::size_t>(clips.count));
   if (options.templates == 0) return out;
-  SequenceTable table = tabulate_sequences(clips, space, 3, progress);
+  const SequenceTable table = tabulate_sequences(clips, space, 3, progress);
   const TemplateGroups groups = group_sequences(table.vectors, options.templates);
-  std::vector<ClipPair> pairs;
-  pairs.reserve(table.entries.size());
-  for (std::size_t i = 0; i < table.entries.size(); ++i) {
-    pairs.push_back({groups.templates[static_cast<std::size_t>(groups.group[i])], static_cast<int>(i)});
-  }
-  progress.check_stop();
-  const auto matches =
-      dtw(table.features, table.features, pairs, {.steps = StepPattern::slope_limited, .want_path = true}, compute);
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    auto& warps = out[static_cast<std::size_t>(table.entries[i].clip)];
-    const auto& t = table.entries[static_cast<std::size_t>(pairs[i].query)];
-    warps.push_back(matches[i].found() ? warp_of_path(matches[i].path, t.rows, table.entries[i].rows) : Warp());
-  }
+  const FeatureSet templates = template_features(clips, table, groups, progress);
+  for_each_clip<std::vector<Warp>>(
+      clips, progress, "group",
+      [&](int i, PreparedClip& clip) {
+        std::vector<Warp> warps;
+        auto group = static_cast<std::size_t>(std::ranges::lower_bound(table.clip, i) - table.clip.begin());
+        FeatureSet sequences{.dims = templates.dims};
+        std::vector<ClipPair> pairs;
+        const auto match = [&] {
+          const auto found =
+              dtw(templates, sequences, pairs, {.steps = StepPattern::slope_limited, .want_path = true}, compute);
+          for (std::size_t s = 0; s < found.size(); ++s) {
+            warps.push_back(found[s].found() ? warp_of_path(found[s].path, templates.rows(pairs[s].query),
+                                                            sequences.rows(pairs[s].target))
+                                             : Warp());
+          }
+          sequences = {.dims = templates.dims};
+          pairs.clear();
+        };
+        visit_features(clip, [&](int, const std::vector<float>& features) {
+          pairs.push_back({groups.group[group++], static_cast<int>(pairs.size())});
+          sequences.add(features);
+          if (pairs.size() == sequences_per_block) match();
+        });
+        if (!pairs.empty()) match();
+        return warps;
+      },
+      [&](int i, std::vector<Warp>& warps) { out[static_cast<std::size_t>(i)] = std::move(warps); });
   return out;
 }
 
-std::vector<Warp> align_prepared(const WarpSearch& search, const MotionSpace& space, const PreparedClip& clip,
+std::vector<Warp> align_prepared(const WarpSearch& search, const MotionSpace& space, PreparedClip& clip,
                                  const std::vector<Warp>& proposals) {
-  SampleMatrix values = clip.curves.values;
-  space.apply_references(values);
+  space.apply_references(clip.curves.values);
   std::vector<Warp> out;
   for (const Run& run : clip.runs) {
-    const RunSampler sampler(values, run, clip.curves.rate_hz);
+    const RunSampler sampler(clip.curves.values, run, clip.curves.rate_hz);
     for (int i = 0; i < run.sequence_count(); ++i) {
       std::span<const Warp> proposal;
       if (!proposals.empty()) proposal = std::span(proposals).subspan(out.size(), 1);
@@ -190,7 +230,7 @@ Survey survey(const PreparedSource& clips, const Progress& progress) {
   int longest = 0;
   for_each_clip<Survey>(
       clips, progress, "survey",
-      [](int, const PreparedClip& clip) {
+      [](int, PreparedClip& clip) {
         Survey one{.orientations = OrientationMoments(curve_layout(clip.skeleton).joint_count()),
                    .skeleton = clip.skeleton,
                    .name = clip.curves.name,
@@ -223,6 +263,12 @@ Survey survey(const PreparedSource& clips, const Progress& progress) {
 
 PreparedClip prepare(const Clip& clip, const SequenceOptions& options) {
   return {clip.skeleton, clip_curves(clip), cut_sequences(clip, options)};
+}
+
+PreparedClip prepare(Clip&& clip, const SequenceOptions& options) {
+  PreparedClip out{.skeleton = clip.skeleton, .curves = {}, .runs = cut_sequences(clip, options)};
+  out.curves = clip_curves(std::move(clip));
+  return out;
 }
 
 PreparedSource source_of(const std::vector<PreparedClip>& clips) {
@@ -258,7 +304,7 @@ BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& opt
       std::vector<std::vector<Warp>> next(static_cast<std::size_t>(clips.count));
       for_each_clip<std::vector<Warp>>(
           clips, progress, "align",
-          [&](int i, const PreparedClip& clip) {
+          [&](int i, PreparedClip& clip) {
             const auto index = static_cast<std::size_t>(i);
             return align_prepared(search, pooled, clip, warps.empty() ? proposals[index] : warps[index]);
           },
@@ -282,8 +328,7 @@ BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips, c
   if (options.align && options.alignment.rounds > 0 && space.options().grouping == Grouping::all_together) {
     const WarpSearch search(space, options.alignment);
     for_each_clip<std::vector<Warp>>(
-        clips, progress, "align",
-        [&](int, const PreparedClip& clip) { return align_prepared(search, space, clip, {}); },
+        clips, progress, "align", [&](int, PreparedClip& clip) { return align_prepared(search, space, clip, {}); },
         [&](int i, std::vector<Warp>& w) { warps[static_cast<std::size_t>(i)] = std::move(w); });
   }
   std::vector<CurveMoments> moments = space.moments();

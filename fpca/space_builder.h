@@ -22,9 +22,14 @@ struct PreparedClip {
   std::vector<Run> runs;
 };
 [[nodiscard]] PreparedClip prepare(const Clip& clip, const SequenceOptions& options = {});
+// The same of a clip that is needed no more (clip_curves).
+[[nodiscard]] PreparedClip prepare(Clip&& clip, const SequenceOptions& options = {});
 
-[[nodiscard]] Bytes pack_prepared(const PreparedClip& clip);
-[[nodiscard]] PreparedClip unpack_prepared(std::span<const std::byte> bytes, const std::string& source);
+// A clip made ready as bytes, in parts of 65 536 frames, so that no long one is held twice. Part 0 has all but the
+// values of the others; `part_of` gives them by number. Throws Error{bad_input} naming `source`.
+[[nodiscard]] int prepared_parts(const PreparedClip& clip);
+[[nodiscard]] Bytes pack_prepared(const PreparedClip& clip, int part);
+[[nodiscard]] PreparedClip unpack_prepared(const std::function<Bytes(int part)>& part_of, const std::string& source);
 
 // Clips by number. `load` may be called from several threads.
 struct PreparedSource {

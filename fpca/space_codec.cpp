@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -78,12 +79,16 @@ std::string group_name(std::size_t i) {
   return fmt::format("group {}", i);
 }
 
+float stored_steps(float score) {
+  return static_cast<float>(std::round(static_cast<double>(score) / score_step));
+}
+
 // One function's scores of all sequences of a clip, in steps, as whole floats: their low bytes are zero and pack well.
 Bytes score_block(const std::vector<const EncodedSequence*>& sequences, Eigen::Index function) {
   std::vector<float> steps;
   for (const EncodedSequence* s : sequences) {
     for (Eigen::Index c = 0; c < s->scores.cols(); ++c) {
-      steps.push_back(static_cast<float>(std::round(static_cast<double>(s->scores(function, c)) / score_step)));
+      steps.push_back(stored_steps(s->scores(function, c)));
     }
   }
   return pack_floats(steps);
@@ -278,6 +283,17 @@ PackedClip pack_clip(const EncodedClip& clip, const MotionSpace& space) {
   return out;
 }
 
+void round_to_stored(EncodedClip& clip) {
+  for (EncodedRun& run : clip.runs) {
+    for (EncodedSequence& s : run.sequences) {
+      for (Eigen::Index i = 0; i < s.scores.size(); ++i) {
+        float& score = s.scores.data()[i];
+        score = stored_steps(score) * static_cast<float>(score_step);
+      }
+    }
+  }
+}
+
 EncodedClip unpack_clip(const PackedClip& packed, const MotionSpace& space, const Skeleton& skeleton,
                         const EncodedClip& header, const std::string& source, int functions) {
   EncodedClip clip{.name = header.name, .rate_hz = header.rate_hz, .frames = header.frames};
@@ -319,8 +335,31 @@ EncodedClip unpack_clip(const PackedClip& packed, const MotionSpace& space, cons
   return clip;
 }
 
-Bytes pack_prepared(const PreparedClip& clip) {
-  ByteWriter out;
+namespace {
+
+constexpr int frames_per_part = 65536;
+using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+int rows_of_part(int frames, int part) {
+  return std::min(frames_per_part, frames - part * frames_per_part);
+}
+
+void put_rows(ByteWriter& out, const SampleMatrix& values, int part) {
+  const int rows = rows_of_part(static_cast<int>(values.rows()), part);
+  const FloatRows some = values.middleRows(part * frames_per_part, rows).cast<float>();
+  out.put_array(std::span<const float>(some.data(), static_cast<std::size_t>(some.size())));
+}
+
+void get_rows(ByteReader& in, int part, SampleMatrix& values) {
+  const int rows = rows_of_part(static_cast<int>(values.rows()), part);
+  const auto numbers =
+      in.get_array<float>(static_cast<std::uint64_t>(rows) * static_cast<std::uint64_t>(values.cols()));
+  in.expect_end();
+  values.middleRows(part * frames_per_part, rows) =
+      Eigen::Map<const FloatRows>(numbers.data(), rows, values.cols()).cast<double>();
+}
+
+void put_head(ByteWriter& out, const PreparedClip& clip) {
   put_short_string(out, clip.curves.name);
   out.put(clip.curves.rate_hz);
   put_vector3(out, clip.curves.placement.start_cm);
@@ -337,21 +376,16 @@ Bytes pack_prepared(const PreparedClip& clip) {
   const Bytes tracks = pack_side_tracks(clip.curves.side_tracks);
   put_varint(out, tracks.size());
   out.put_bytes(tracks);
-  const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values = clip.curves.values.cast<float>();
-  out.put_array(std::span<const float>(values.data(), static_cast<std::size_t>(values.size())));
-  return one_section("prepared-clip", "clip", std::move(out).take());
 }
 
-PreparedClip unpack_prepared(std::span<const std::byte> bytes, const std::string& source) {
-  const Bitstream stream = Bitstream::parse(bytes, source);
-  stream.require_kind("prepared-clip");
-  ByteReader in(stream.section("clip"), source);
+PreparedClip get_head(ByteReader& in, const std::string& source) {
   PreparedClip out;
   out.curves.name = get_short_string(in);
   out.curves.rate_hz = in.get<double>();
   out.curves.placement.start_cm = get_vector3(in);
   out.curves.placement.heading_rad = in.get<double>();
   const std::uint64_t frames = get_varint(in);
+  if (frames < 1 || frames > std::numeric_limits<int>::max()) in.fail("no number of frames", "1 to 2147483647");
   const std::size_t runs = get_count(in, 1, "runs");
   for (std::size_t r = 0; r < runs; ++r) {
     Run& run = out.runs.emplace_back();
@@ -365,12 +399,33 @@ PreparedClip unpack_prepared(std::span<const std::byte> bytes, const std::string
   }
   out.skeleton = unpack_skeleton(get_part(in, "bytes"), source);
   out.curves.side_tracks = unpack_side_tracks(get_part(in, "bytes"), static_cast<int>(frames), out.skeleton, source);
-  const int curves = curve_layout(out.skeleton).curve_count();
-  const auto values = in.get_array<float>(frames * static_cast<std::uint64_t>(curves));
-  in.expect_end();
-  out.curves.values = Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(
-                          values.data(), static_cast<Eigen::Index>(frames), curves)
-                          .cast<double>();
+  out.curves.values.resize(static_cast<Eigen::Index>(frames), curve_layout(out.skeleton).curve_count());
+  return out;
+}
+
+}  // namespace
+
+int prepared_parts(const PreparedClip& clip) {
+  return (clip.curves.frames() + frames_per_part - 1) / frames_per_part;
+}
+
+Bytes pack_prepared(const PreparedClip& clip, int part) {
+  ByteWriter out;
+  if (part == 0) put_head(out, clip);
+  put_rows(out, clip.curves.values, part);
+  return one_section("prepared-clip", "clip", std::move(out).take());
+}
+
+PreparedClip unpack_prepared(const std::function<Bytes(int part)>& part_of, const std::string& source) {
+  PreparedClip out;
+  for (int part = 0; part == 0 || part < prepared_parts(out); ++part) {
+    const Bytes bytes = part_of(part);
+    const Bitstream stream = Bitstream::parse(bytes, source);
+    stream.require_kind("prepared-clip");
+    ByteReader in(stream.section("clip"), source);
+    if (part == 0) out = get_head(in, source);
+    get_rows(in, part, out.curves.values);
+  }
   return out;
 }
 

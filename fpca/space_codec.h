@@ -30,6 +30,8 @@ struct PackedClip {
   Bytes side;     // where the clip stands, what each sequence travels, side tracks
 };
 [[nodiscard]] PackedClip pack_clip(const EncodedClip& clip, const MotionSpace& space);
+// What the clip is after pack_clip and unpack_clip: its scores are in the steps that they are stored in.
+void round_to_stored(EncodedClip& clip);
 // With at most `functions` functions (all when < 0), of a stream that may end early. `header` gives name, rate and
 // frames.
 [[nodiscard]] EncodedClip unpack_clip(const PackedClip& packed, const MotionSpace& space, const Skeleton& skeleton,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "motion/position_blocks.h"
 #include "motion/simd.h"
 
 namespace kinespace {
@@ -94,8 +95,9 @@ void world_frames(const Clip& clip, int frame, std::vector<JointFrame>& out) {
   }
 }
 
-JointPositions joint_positions(const Clip& clip) {
-  JointPositions out{clip.frames, clip.skeleton.joint_count(), {}};
+void positions_of_frames(const Clip& clip, int first, int count, JointPositions& out) {
+  out.frames = count;
+  out.joints = clip.skeleton.joint_count();
   const auto joints = static_cast<std::size_t>(out.joints);
   out.values.resize(static_cast<std::size_t>(out.frames) * joints);
   const auto tracks = tracks_by_joint(clip);
@@ -103,18 +105,33 @@ JointPositions joint_positions(const Clip& clip) {
   WorldBlock origin{};
   origin.w.fill(1);
   LocalBlock local{};
-  for (int first = 0; first < clip.frames; first += frame_block) {
-    const int count = std::min(frame_block, clip.frames - first);
+  for (int done = 0; done < count; done += frame_block) {
+    const int some = std::min(frame_block, count - done);
     for (std::size_t j = 0; j < joints; ++j) {
       const int parent = clip.skeleton.joints[j].parent;
-      load(clip, static_cast<int>(j), tracks[j], first, count, local);
+      load(clip, static_cast<int>(j), tracks[j], first + done, some, local);
       WorldBlock& here = world[j];
       chain(parent < 0 ? origin : world[static_cast<std::size_t>(parent)], local, here);
-      Eigen::Vector3d* to = out.values.data() + static_cast<std::size_t>(first) * joints + j;
-      for (int f = 0; f < count; ++f, to += joints) *to = {here.px[f], here.py[f], here.pz[f]};
+      Eigen::Vector3d* to = out.values.data() + static_cast<std::size_t>(done) * joints + j;
+      for (int f = 0; f < some; ++f, to += joints) *to = {here.px[f], here.py[f], here.pz[f]};
     }
   }
+}
+
+JointPositions joint_positions(const Clip& clip) {
+  JointPositions out;
+  positions_of_frames(clip, 0, clip.frames, out);
   return out;
+}
+
+void for_each_position_block(const Clip& clip, int overlap,
+                             const std::function<void(int first, const JointPositions&)>& visit) {
+  JointPositions block;
+  for (int next = 0; next < clip.frames; next += position_block_frames) {
+    const int first = std::max(0, next - overlap);
+    positions_of_frames(clip, first, std::min(clip.frames, next + position_block_frames) - first, block);
+    visit(first, block);
+  }
 }
 
 }  // namespace kinespace

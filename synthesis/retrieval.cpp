@@ -48,10 +48,11 @@ class RerankBatch {
  public:
   RerankBatch(ClipCurves curves, const Skeleton& skeleton, const QueryOptions& options, const Compute& compute)
       : options_(options), compute_(compute) {
-    const PoseFeatures features = pose_features(curves, skeleton);
+    PoseFeatures features = pose_features(curves, skeleton);
     query_ = {curves.frames(), features.rows};
     queries_.dims = targets_.dims = features.dims;
-    queries_.add(features.values);
+    queries_.starts.push_back(features.rows);
+    queries_.values = std::move(features.values);  // of a long clip as large as its curves
   }
 
   // True when the batch is large enough to be worked off.

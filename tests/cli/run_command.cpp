@@ -15,6 +15,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -121,9 +122,11 @@ void Command::send(int signal) const {
 
 CommandResult Command::finish() {
   int status = 0;
-  if (::waitpid(child_, &status, 0) != child_) throw std::system_error(errno, std::generic_category(), "waitpid");
+  rusage usage{};
+  if (::wait4(child_, &status, 0, &usage) != child_) throw std::system_error(errno, std::generic_category(), "wait4");
   child_ = -1;
   CommandResult result;
+  result.peak_bytes = static_cast<std::size_t>(usage.ru_maxrss) * 1024;
   if (WIFEXITED(status)) result.code = WEXITSTATUS(status);
   if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
   if (std::filesystem::exists(folder_ / "out")) result.out = read_text(folder_ / "out");

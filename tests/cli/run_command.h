@@ -11,10 +11,11 @@
 namespace kinespace::test {
 
 struct CommandResult {
-  int code = -1;    // the exit code; -1 when a signal ended it
-  int signal = 0;   // the signal that ended it, 0 for none
-  std::string out;  // standard output
-  std::string err;  // standard error
+  int code = -1;               // the exit code; -1 when a signal ended it
+  int signal = 0;              // the signal that ended it, 0 for none
+  std::string out;             // standard output
+  std::string err;             // standard error
+  std::size_t peak_bytes = 0;  // the most that it had in memory
 };
 
 struct CommandOptions {

@@ -1,11 +1,15 @@
 #include "fpca/curves.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "base/error.h"
+#include "fpca/pose_features.h"
 #include "fpca/uniform_spline.h"
 #include "motion/error_measures.h"
 #include "tests/fpca/sample_space.h"
@@ -46,6 +50,77 @@ TEST(Curves, the_way_there_and_back_keeps_every_joint) {
   for (const Clip& clip : test::sample_clips()) {
     const MotionError error = compare(clip, clip_from_curves(clip_curves(clip), clip.skeleton));
     EXPECT_LT(error.max_joint_error_cm, 1e-9) << clip.name;
+  }
+}
+
+// Long enough that curves are made in several blocks of frames.
+Clip long_clip() {
+  const Clip& once = test::sample_clips().front();
+  const int frames = 150'000;
+  Clip out = make_clip("long", once.skeleton, once.rate_hz, frames);
+  for (int j = 0; j < once.skeleton.joint_count(); ++j) {
+    for (int f = 0; f < frames; ++f) out.set_rotation(j, f, once.rotation(j, f % once.frames));
+  }
+  for (const auto& track : once.translations) {
+    auto& values = out.require_translation_track(track.joint).values;
+    for (int f = 0; f < frames; ++f) {
+      values[static_cast<std::size_t>(f)] = track.values[static_cast<std::size_t>(f % once.frames)];
+    }
+  }
+  return out;
+}
+
+TEST(Curves, a_clip_that_gives_up_its_memory_has_the_same_curves) {
+  Clip clip = long_clip();
+  const ClipCurves kept = clip_curves(clip);
+  const ClipCurves taken = clip_curves(std::move(clip));
+  EXPECT_EQ(taken.values, kept.values);
+  EXPECT_EQ(taken.placement.start_cm, kept.placement.start_cm);
+  EXPECT_EQ(taken.side_tracks.size(), kept.side_tracks.size());
+}
+
+TEST(Curves, a_part_of_a_clip_is_what_the_whole_has_there) {
+  for (const Clip& clip : test::sample_clips()) {
+    const ClipCurves curves = clip_curves(clip);
+    const Clip whole = clip_from_curves(curves, clip.skeleton);
+    const int first = clip.frames / 3;
+    const int count = std::min(40, clip.frames - first);
+    const Clip part = clip_of_frames(curves, curves.values.middleRows(first, count), first, clip.skeleton);
+    const Clip expected = slice(whole, first, count);
+    EXPECT_EQ(part.rotations, expected.rotations) << clip.name;
+    for (const auto& track : expected.translations) {
+      EXPECT_EQ(part.translation_track(track.joint)->values, track.values) << clip.name;
+    }
+  }
+}
+
+TEST(Curves, a_long_clip_made_ready_is_kept_in_parts) {
+  const PreparedClip clip = prepare(long_clip());
+  ASSERT_EQ(prepared_parts(clip), 3);
+  const PreparedClip back = unpack_prepared([&](int part) { return pack_prepared(clip, part); }, "test");
+  EXPECT_EQ(back.curves.values, clip.curves.values.cast<float>().cast<double>());
+  ASSERT_EQ(back.runs.size(), clip.runs.size());
+  EXPECT_EQ(back.runs[0].cuts, clip.runs[0].cuts);
+  const Bytes last = pack_prepared(clip, 2);
+  EXPECT_THROW(static_cast<void>(
+                   unpack_prepared([&](int part) { return part == 1 ? last : pack_prepared(clip, part); }, "test")),
+               Error)
+      << "a part of another length";
+}
+
+TEST(PoseFeatures, any_keyframes_are_those_of_the_whole_clip) {
+  for (const Clip& clip : test::sample_clips()) {
+    const ClipCurves curves = clip_curves(clip);
+    for (const double rate_hz : {30.0, 25.0, curves.rate_hz}) {
+      const PoseFeatures whole = pose_features(curves, clip.skeleton, {.rate_hz = rate_hz});
+      const PoseFeatureSource source(curves, clip.skeleton, {.rate_hz = rate_hz});
+      ASSERT_EQ(source.rows(), whole.rows);
+      std::vector<float> pieces;
+      for (int first = 0; first < whole.rows; first += 7) {
+        source.append(first, std::min(7, whole.rows - first), pieces);
+      }
+      EXPECT_EQ(pieces, whole.values) << clip.name << " at " << rate_hz;
+    }
   }
 }
 

@@ -190,6 +190,31 @@ TEST(SpaceCodec, a_space_comes_back_bit_for_bit) {
   EXPECT_EQ(pack_space(back), bytes);
 }
 
+TEST(SpaceCodec, rounding_to_what_is_stored_is_what_storing_does) {
+  EncodedClip clip = encode_sample(sample_space(), 0);
+  const PackedClip packed = pack_clip(clip, sample_space().space);
+  const EncodedClip back = unpack_clip(packed, sample_space().space, sample_clips()[0].skeleton, clip, "test");
+  round_to_stored(clip);
+  for (std::size_t r = 0; r < clip.runs.size(); ++r) {
+    for (std::size_t i = 0; i < clip.runs[r].sequences.size(); ++i) {
+      EXPECT_EQ(clip.runs[r].sequences[i].scores, back.runs[r].sequences[i].scores);
+    }
+  }
+  EXPECT_EQ(pack_clip(clip, sample_space().space).vectors, packed.vectors) << "and so is storing it again";
+}
+
+TEST(MotionSpace, decoding_in_parts_hands_over_every_frame_once) {
+  const EncodedClip clip = encode_sample(sample_space(), 1);
+  const ClipCurves whole = decode(sample_space().space, clip);
+  int next = 0;
+  decode_in_parts(sample_space().space, clip, -1, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
+    EXPECT_EQ(first, next);
+    EXPECT_EQ(rows, whole.values.middleRows(first, rows.rows()));
+    next = first + static_cast<int>(rows.rows());
+  });
+  EXPECT_EQ(next, clip.frames);
+}
+
 TEST(SpaceCodec, a_clip_comes_back_within_half_a_step_of_each_score) {
   const EncodedClip clip = encode_sample(sample_space(), 0);
   const PackedClip packed = pack_clip(clip, sample_space().space);
