@@ -8,7 +8,7 @@ target_compile_options(kinespace_build_flags INTERFACE
   -ffp-contract=off   # the same bits whatever the processor
   -fpch-preprocess)   # lets ccache see through precompiled headers
 target_compile_options(kinespace_build_flags INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow=local -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast
+  -Wall -Wextra -Wpedantic $<$<CXX_COMPILER_ID:GNU>:-Wshadow=local> -Wconversion -Wno-sign-conversion -Wnon-virtual-dtor -Wold-style-cast
   -Wno-missing-field-initializers  # designated initialisers leave fields at their defaults on purpose
   $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>  # GCC 12 sees overlaps that are not there in "literal" + std::string (GCC bug 105651)
   $<$<BOOL:${KINESPACE_WERROR}>:-Werror>)
