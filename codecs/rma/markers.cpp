@@ -182,15 +182,11 @@ AlignedClips align_clips(std::span<const Clip> clips) {
   for (const Skeleton& skeleton : table.skeletons) out.rigs.emplace_back(skeleton);
   if (clips.empty()) return out;
   out.rate_hz = clips.front().rate_hz;
-  std::vector<ClipCurves> curves(clips.size());
-  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) { curves[c] = clip_curves(clips[c]); });
-  ReferencePoseBuilder builder(table.skeletons.front());
-  for (const ClipCurves& one : curves) builder.add(one);
-  out.reference = builder.build();
+  out.reference = reference_pose(clips);
   out.vectors.resize(clips.size());
   out.degrees.resize(clips.size());
   tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
-    out.vectors[c] = pose_vectors(curves[c], out.reference);
+    out.vectors[c] = pose_vectors(clips[c], out.reference);
     out.degrees[c] = alignment_degrees(out.vectors[c], out.reference);
   });
   return out;
