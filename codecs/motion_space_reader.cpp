@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
-#include <tbb/task_arena.h>
 
 #include "base/error.h"
 #include "codecs/motion_space_codec.h"
@@ -101,7 +101,7 @@ class MotionSpaceReader final : public StreamReader {
 
   // Groups are decoded and measured several at a time, and added up in their order.
   [[nodiscard]] ClipErrorSums error_of(std::span<const Clip> originals) const {
-    const auto at_once = static_cast<std::size_t>(2 * tbb::this_task_arena::max_concurrency());
+    const std::size_t at_once = 2 * tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     std::vector<ClipErrorSums> clips(originals.size());
     std::size_t next = 0;
     const auto draw = [&](tbb::flow_control& control) {

@@ -101,12 +101,12 @@ void RepeatEncoder::add_statistics() {
 void RepeatEncoder::cut(std::size_t clip, double step) {
   const int d = aligned_.reference.dimensions();
   const int planned = std::min(planned_components, d);
-  const RowMatrix z = (exact_.basis.transpose() * metric_).topRows(planned) * curves_of(aligned_.vectors[clip], d);
+  RowMatrix z = (exact_.basis.transpose() * metric_).topRows(planned) * curves_of(aligned_.vectors[clip], d);
   ClipEntry& entry = table_.clips[clip];
   const std::vector<int> jumps = find_jumps(z, 1, aligned_.vectors[clip].jumps);
-  const RowMatrix scaled = z / step;
-  entry.blocks = plan_blocks({scaled.data(), static_cast<std::size_t>(scaled.size())}, planned, entry.frames,
-                             entry.rate_hz, jumps, {.longest_frames = longest_block});
+  z /= step;
+  entry.blocks = plan_blocks({z.data(), static_cast<std::size_t>(z.size())}, planned, entry.frames, entry.rate_hz,
+                             jumps, {.longest_frames = longest_block});
   entry.finer.assign(entry.blocks.size(), 0);
 }
 
