@@ -18,6 +18,24 @@ double rounded_up(double value) {
   return std::nextafter(near, std::numeric_limits<float>::infinity());
 }
 
+// take(error) of every joint of every frame, in order.
+template <typename Take>
+void measure_joints(const Clip& original, const Clip& decoded, int first, int count, int decoded_first,
+                    const Take& take) {
+  std::vector<JointFrame> a, b;
+  for (int f = 0; f < count; ++f) {
+    world_frames(original, first + f, a);
+    world_frames(decoded, decoded_first + f, b);
+    for (std::size_t j = 0; j < a.size(); ++j) {
+      const Eigen::Vector3d apart = a[j].position - b[j].position;
+      const Eigen::Matrix3d turned = shell_cm * (a[j].rotation.toRotationMatrix() - b[j].rotation.toRotationMatrix());
+      double worst = 0;
+      for (int k = 0; k < 3; ++k) worst = std::max(worst, (turned.col(k) + apart).squaredNorm());
+      take(JointError{.distance = apart.norm(), .shell = std::sqrt(worst)});
+    }
+  }
+}
+
 }  // namespace
 
 void ClipErrorSums::add(const ClipErrorSums& other) {
@@ -25,6 +43,13 @@ void ClipErrorSums::add(const ClipErrorSums& other) {
   largest = std::max(largest, other.largest);
   shell += other.shell;
   count += other.count;
+}
+
+void ClipErrorSums::add(const JointError& joint) {
+  distance += joint.distance;
+  largest = std::max(largest, joint.distance);
+  shell += joint.shell;
+  ++count;
 }
 
 MeasuredError ClipErrorSums::measured() const {
@@ -35,23 +60,14 @@ MeasuredError ClipErrorSums::measured() const {
 
 ClipErrorSums clip_error(const Clip& original, const Clip& decoded, int first, int count, int decoded_first) {
   ClipErrorSums out;
-  std::vector<JointFrame> a, b;
-  for (int f = 0; f < count; ++f) {
-    world_frames(original, first + f, a);
-    world_frames(decoded, decoded_first + f, b);
-    for (std::size_t j = 0; j < a.size(); ++j) {
-      const Eigen::Vector3d apart = a[j].position - b[j].position;
-      const double distance = apart.norm();
-      const Eigen::Matrix3d turned = shell_cm * (a[j].rotation.toRotationMatrix() - b[j].rotation.toRotationMatrix());
-      double worst = 0;
-      for (int k = 0; k < 3; ++k) worst = std::max(worst, (turned.col(k) + apart).squaredNorm());
-      out.distance += distance;
-      out.largest = std::max(out.largest, distance);
-      out.shell += std::sqrt(worst);
-    }
-    out.count += static_cast<std::int64_t>(a.size());
-  }
+  measure_joints(original, decoded, first, count, decoded_first, [&](const JointError& joint) { out.add(joint); });
   return out;
+}
+
+void append_joint_errors(const Clip& original, const Clip& decoded, int first, int count, int decoded_first,
+                         std::vector<JointError>& out) {
+  measure_joints(original, decoded, first, count, decoded_first,
+                 [&](const JointError& joint) { out.push_back(joint); });
 }
 
 double raw_bytes(const Clip& clip) {

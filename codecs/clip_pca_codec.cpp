@@ -109,7 +109,8 @@ class ClipPcaEncoder {
     tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
       const int frames = clips_[c].frames;
       std::vector<double> markers(static_cast<std::size_t>(coordinates) * static_cast<std::size_t>(frames));
-      clip_markers(aligned_, c, MarkerDecoder::alignment(roots_[c], root_span_), markers.data(), true);
+      clip_markers(aligned_, c, MarkerDecoder::alignment(roots_[c], root_span_), 0, clips_[c].frames, markers.data(),
+                   true);
       Eigen::MatrixXd piece(length_, coordinates);
       for (int p = 0; p * length_ < frames; ++p) {
         for (int f = 0; f < length_; ++f) {

@@ -14,8 +14,6 @@ namespace {
 
 constexpr std::size_t windows_at_once = 16;
 
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 double finer_factor(int finer) {
   return std::pow(2.0, 0.5 * finer);
 }
@@ -49,8 +47,7 @@ Eigen::VectorXd MotionSpaceEncoder::gains(double step, const WindowLayout& layou
     for (std::size_t i = part * windows_at_once; i < end; ++i) {
       const std::size_t w = windows[i];
       const double finer = finer_factor(layout.windows[w].finer);
-      const Eigen::Map<const RowMatrix> all(coefficients_[w].data(), d, layout.windows[w].points);
-      const RowMatrix z = (finer * analysis) * all.leftCols(active_functions(w, step / finer));
+      const RowMatrix z = (finer * analysis) * coefficients(w).leftCols(active_functions(w, step / finer));
       for (Eigen::Index c = 0; c < d; ++c) {
         for (Eigen::Index k = 0; k < z.cols(); ++k) {
           const double square = z(c, k) * z(c, k);
@@ -169,7 +166,7 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
   const int components = a.tables.basis.components;
 
   // Scaled coefficients, and what the spectrum of their plain rounding is.
-  coding.wanted.resize(coefficients_.size());
+  coding.wanted.resize(windows_.size());
   std::vector<CodingStatistics> plain((windows.size() + windows_at_once - 1) / windows_at_once);
   tbb::parallel_for(std::size_t{0}, plain.size(), [&](std::size_t part) {
     const std::size_t end = std::min(windows.size(), (part + 1) * windows_at_once);
@@ -178,9 +175,8 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
       const WindowPlace& window = a.layout.windows[w];
       const double factor = finer_factor(window.finer);
       const int functions = active_functions(w, step / factor);
-      const Eigen::Map<const RowMatrix> all(coefficients_[w].data(), reference_.dimensions(), window.points);
       RowMatrix& wanted = coding.wanted[w];
-      wanted.noalias() = (factor * projection) * all.leftCols(functions);
+      wanted.noalias() = (factor * projection) * coefficients(w).leftCols(functions);
       plain[part].add_plain({wanted.data(), static_cast<std::size_t>(wanted.size())}, functions, window.points,
                             a.clips.clips[static_cast<std::size_t>(window.clip)].rate_hz, components);
     }
@@ -207,14 +203,7 @@ Attempt MotionSpaceEncoder::attempt(double step, const MotionSpaceSettings& sett
   return std::move(coding.attempt);
 }
 
-ClipErrorSums MotionSpaceEncoder::error_of(std::span<const Clip> decoded) const {
-  std::vector<ClipErrorSums> parts(clips_.size());
-  tbb::parallel_for(std::size_t{0}, clips_.size(),
-                    [&](std::size_t c) { parts[c] = clip_error(clips_[c], decoded[c], 0, clips_[c].frames, 0); });
-  ClipErrorSums out;
-  for (const ClipErrorSums& part : parts) out.add(part);
-  return out;
-}
+namespace {
 
 Bytes write_stream(const Attempt& attempt, const MeasuredError& error, const MotionSpaceBasis* basis) {
   BitstreamWriter out(stream_kind("motion-space"));
@@ -241,6 +230,13 @@ Bytes write_stream(const Attempt& attempt, const MeasuredError& error, const Mot
   }
   out.add_progressive_section("layers", layers);
   return out.finish();
+}
+
+}  // namespace
+
+Bytes MotionSpaceEncoder::finish(const Attempt& attempt) const {
+  const Bytes draft = write_stream(attempt, {}, basis_);
+  return write_stream(attempt, decoded_error(draft, clips_, basis_).measured(), basis_);
 }
 
 }  // namespace kinespace

@@ -16,8 +16,7 @@ namespace {
 constexpr std::size_t metric_samples = 256;
 constexpr int planned_components = 16;  // that windows are planned by: nearly all of the energy
 
-using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-using Curves = Eigen::Map<const RowMatrix>;
+using Curves = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
 
 Curves curves_of(const PoseVectors& vectors, int dimensions) {
   return {vectors.values.data(), dimensions, vectors.frames};
@@ -45,29 +44,30 @@ void require_same_tree(const MotionSpaceBasis& basis, const Clip& clip) {
 MotionSpaceEncoder::MotionSpaceEncoder(std::span<const Clip> clips, const Progress& progress,
                                        const MotionSpaceBasis* basis)
     : clips_(clips), progress_(progress), basis_(basis), vectors_(clips.size()) {
-  std::vector<ClipCurves> curves(clips.size());
   for (const Clip& clip : clips) {
     const int skeleton = table_.add_skeleton(clip.skeleton, clip.name);
     table_.clips.push_back({.name = clip.name, .skeleton = skeleton, .rate_hz = clip.rate_hz, .frames = clip.frames});
     frames_ += clip.frames;
   }
-  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) { curves[c] = clip_curves(clips[c]); });
   if (basis_ != nullptr) {
     require_same_tree(*basis_, clips.front());
     reference_ = basis_->reference();
   } else {
-    ReferencePoseBuilder builder(table_.skeletons.front());
-    for (const ClipCurves& one : curves) builder.add(one);
-    reference_ = builder.build();
+    reference_ = reference_pose(clips);
   }
-  progress_.check_stop();
-  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
-    vectors_[c] = pose_vectors(curves[c], reference_);
-    table_.clips[c].placement = vectors_[c].placement;
-    table_.clips[c].side_tracks = vectors_[c].side_tracks;
-  });
+  take_vectors();
   add_moments();
   add_metrics();
+}
+
+void MotionSpaceEncoder::take_vectors() {
+  progress_.check_stop();
+  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+    vectors_[c] = {};
+    vectors_[c] = pose_vectors(clips_[c], reference_);
+    table_.clips[c].placement = vectors_[c].placement;
+    table_.clips[c].side_tracks = std::move(vectors_[c].side_tracks);
+  });
 }
 
 void MotionSpaceEncoder::add_moments() {
@@ -105,6 +105,7 @@ void MotionSpaceEncoder::add_metrics() {
 }
 
 void MotionSpaceEncoder::plan(double step, const MotionSpaceSettings& settings) {
+  if (!windows_.empty()) take_vectors();  // the plan before made coefficients of them
   weigh(settings.shell_weight);
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { cut(c, step, settings); });
   transform();
@@ -123,44 +124,50 @@ void MotionSpaceEncoder::weigh(double shell_weight) {
 
 void MotionSpaceEncoder::transform() {
   progress_.check_stop();
+  windows_.clear();
   first_window_.assign(1, 0);
-  for (const ClipEntry& clip : table_.clips) first_window_.push_back(first_window_.back() + clip.blocks.size());
-  coefficients_.assign(first_window_.back(), {});
-
-  const int d = reference_.dimensions();
   std::map<int, std::shared_ptr<const WindowTransform>> transforms;
-  std::vector<int> lengths;
-  for (const ClipEntry& clip : table_.clips) lengths.insert(lengths.end(), clip.blocks.begin(), clip.blocks.end());
-  std::ranges::sort(lengths);
-  lengths.erase(std::unique(lengths.begin(), lengths.end()), lengths.end());
-  std::vector<std::shared_ptr<const WindowTransform>> made(lengths.size());
-  tbb::parallel_for(std::size_t{0}, lengths.size(),
-                    [&](std::size_t i) { made[i] = std::make_shared<const WindowTransform>(lengths[i], lengths[i]); });
-  for (std::size_t i = 0; i < lengths.size(); ++i) transforms[lengths[i]] = made[i];
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
-    const double* const curves = vectors_[c].values.data();
+  for (std::size_t c = 0; c < clips_.size(); ++c) {
     int first = 0;
-    for (std::size_t b = 0; b < table_.clips[c].blocks.size(); ++b) {
-      const int points = table_.clips[c].blocks[b];
-      auto& out = coefficients_[first_window_[c] + b];
-      out.resize(static_cast<std::size_t>(d) * static_cast<std::size_t>(points));
-      transforms.at(points)->analyse(curves + first, vectors_[c].frames, d, out.data());
+    for (const int points : table_.clips[c].blocks) {
+      windows_.push_back({.clip = c, .first = first, .points = points});
+      transforms[points] = nullptr;
       first += points;
     }
+    first_window_.push_back(windows_.size());
+  }
+  std::vector<int> lengths;
+  for (const auto& [points, none] : transforms) lengths.push_back(points);
+  tbb::parallel_for(std::size_t{0}, lengths.size(), [&](std::size_t i) {
+    transforms.at(lengths[i]) = std::make_shared<const WindowTransform>(lengths[i], lengths[i]);
+  });
+
+  const int d = reference_.dimensions();
+  tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+    const Window& window = windows_[w];
+    PoseVectors& vectors = vectors_[window.clip];
+    double* const place = vectors.values.data() + window.first;
+    RowMatrix out(d, window.points);
+    transforms.at(window.points)->analyse(place, vectors.frames, d, out.data());
+    Eigen::Map<RowMatrix, 0, Eigen::OuterStride<>>(place, d, window.points, Eigen::OuterStride<>(vectors.frames)) = out;
   });
   progress_.check_stop();
 }
 
+MotionSpaceEncoder::Coefficients MotionSpaceEncoder::coefficients(std::size_t w) const {
+  const Window& window = windows_[w];
+  const PoseVectors& vectors = vectors_[window.clip];
+  return {vectors.values.data() + window.first, reference_.dimensions(), window.points,
+          Eigen::OuterStride<>(vectors.frames)};
+}
+
 void MotionSpaceEncoder::measure_energies() {
   const RowMatrix root = Eigen::MatrixXd(metric_.llt().matrixU());
-  energies_.resize(coefficients_.size());
-  tbb::parallel_for(std::size_t{0}, coefficients_.size(), [&](std::size_t w) {
-    const Eigen::Index d = root.rows();
-    const auto points = static_cast<Eigen::Index>(coefficients_[w].size()) / d;
-    const RowMatrix moved =
-        root.triangularView<Eigen::Upper>() * Eigen::Map<const RowMatrix>(coefficients_[w].data(), d, points);
-    energies_[w].resize(static_cast<std::size_t>(points));
-    Eigen::Map<Eigen::RowVectorXd>(energies_[w].data(), points) = moved.colwise().squaredNorm();
+  energies_.resize(windows_.size());
+  tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+    const RowMatrix moved = root.triangularView<Eigen::Upper>() * coefficients(w);
+    energies_[w].resize(static_cast<std::size_t>(moved.cols()));
+    Eigen::Map<Eigen::RowVectorXd>(energies_[w].data(), moved.cols()) = moved.colwise().squaredNorm();
   });
 }
 
@@ -170,7 +177,7 @@ void MotionSpaceEncoder::cut(std::size_t c, double step, const MotionSpaceSettin
   const RowMatrix analysis = (exact_.basis.transpose() * metric_).topRows(planned) / step;
   const RowMatrix z = analysis * curves_of(vectors_[c], d);
   ClipEntry& clip = table_.clips[c];
-  const std::vector<int> jumps = find_jumps(z * step, vectors_[c].jumps);
+  const std::vector<int> jumps = find_jumps(z, step, vectors_[c].jumps);
   if (settings.window_s > 0) {
     const auto wanted = std::clamp<std::int64_t>(std::llround(settings.window_s * clip.rate_hz), 1, longest_block / 2);
     clip.blocks.clear();

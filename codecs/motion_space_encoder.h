@@ -47,17 +47,28 @@ class MotionSpaceEncoder {
   [[nodiscard]] std::size_t window_count() const { return first_window_.back(); }
   [[nodiscard]] std::int64_t frames() const { return frames_; }
   [[nodiscard]] const std::vector<Skeleton>& skeletons() const { return table_.skeletons; }
-  // Of decoded clips, in the order of those that are encoded.
-  [[nodiscard]] ClipErrorSums error_of(std::span<const Clip> decoded) const;
+  // The finished stream, with the error of what a reader decodes from it.
+  [[nodiscard]] Bytes finish(const Attempt& attempt) const;
 
  private:
   struct Coding;
+  struct Window {
+    std::size_t clip = 0;
+    int first = 0;
+    int points = 0;
+  };
+  using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  // [dimension][function], all functions of the pose vectors.
+  using Coefficients = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
+
+  void take_vectors();
   void add_moments();
   void add_metrics();
   void cut(std::size_t clip, double step, const MotionSpaceSettings& settings);
   void weigh(double shell_weight);
   void transform();
   void measure_energies();
+  [[nodiscard]] Coefficients coefficients(std::size_t window) const;
   [[nodiscard]] int active_functions(std::size_t window, double step) const;
   [[nodiscard]] Eigen::VectorXd gains(double step, const WindowLayout& layout,
                                       std::span<const std::size_t> windows) const;
@@ -70,18 +81,22 @@ class MotionSpaceEncoder {
   const MotionSpaceBasis* basis_;
   ClipTable table_;
   ReferencePose reference_;
+  // A clip's pose vectors; once there is a plan, their coefficients instead, each window's where its frames were: the
+  // two together would take as much as the clips do.
   std::vector<PoseVectors> vectors_;
   std::int64_t frames_ = 0;
   Eigen::MatrixXd moments_;  // mean of x x'
   PoseMetric metrics_;       // mean over sampled poses
   Eigen::MatrixXd metric_;
   KarhunenLoeve exact_;
-  std::vector<std::size_t> first_window_;          // by clip, and the end
-  std::vector<std::vector<double>> coefficients_;  // by window: [dimension][point], all functions of the pose vectors
-  std::vector<std::vector<double>> energies_;      // by window and function: what it moves, squared, in the metric
+  std::vector<Window> windows_;                // of the plan, clip by clip
+  std::vector<std::size_t> first_window_;      // by clip, and the end
+  std::vector<std::vector<double>> energies_;  // by window and function: what it moves, squared, in the metric
 };
 
-// The finished stream.
-[[nodiscard]] Bytes write_stream(const Attempt& attempt, const MeasuredError& error, const MotionSpaceBasis* basis);
+// How far what a reader decodes from a stream is from the clips that it was made of. Holds the clips of a few groups of
+// windows at a time, not all.
+[[nodiscard]] ClipErrorSums decoded_error(std::span<const std::byte> stream, std::span<const Clip> originals,
+                                          const MotionSpaceBasis* basis);
 
 }  // namespace kinespace

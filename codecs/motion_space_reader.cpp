@@ -3,10 +3,13 @@
 #include <cmath>
 
 #include <fmt/format.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_pipeline.h>
 
 #include "base/error.h"
 #include "codecs/motion_space_codec.h"
+#include "codecs/motion_space_encoder.h"
 #include "codecs/motion_space_tables.h"
 #include "codecs/registry.h"
 #include "storage/varint.h"
@@ -96,7 +99,55 @@ class MotionSpaceReader final : public StreamReader {
     return out;
   }
 
+  // Groups are decoded and measured several at a time, and added up in their order.
+  [[nodiscard]] ClipErrorSums error_of(std::span<const Clip> originals) const {
+    const std::size_t at_once = 2 * tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    std::vector<ClipErrorSums> clips(originals.size());
+    std::size_t next = 0;
+    const auto draw = [&](tbb::flow_control& control) {
+      if (next == layout_.groups.size()) control.stop();
+      return next++;
+    };
+    const auto measure = [&](std::size_t g) { return group_errors(g, originals); };
+    const auto add = [&](const std::vector<RunErrors>& runs) {
+      for (const RunErrors& run : runs) {
+        for (const JointError& joint : run.joints) clips[run.clip].add(joint);
+      }
+    };
+    tbb::parallel_pipeline(
+        at_once, tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, draw) &
+                     tbb::make_filter<std::size_t, std::vector<RunErrors>>(tbb::filter_mode::parallel, measure) &
+                     tbb::make_filter<std::vector<RunErrors>, void>(tbb::filter_mode::serial_in_order, add));
+    ClipErrorSums out;
+    for (const ClipErrorSums& clip : clips) out.add(clip);
+    return out;
+  }
+
  private:
+  // Of windows of one clip that follow one another.
+  struct RunErrors {
+    std::size_t clip = 0;
+    std::vector<JointError> joints;
+  };
+
+  [[nodiscard]] std::vector<RunErrors> group_errors(std::size_t g, std::span<const Clip> originals) const {
+    const WindowGroup& group = layout_.groups[g];
+    const GroupValues values = decode_values(g, -1);
+    std::vector<RunErrors> out;
+    for (std::size_t w = group.first; w < group.first + group.count;) {
+      const auto clip = static_cast<std::size_t>(layout_.windows[w].clip);
+      const std::size_t begin = w;
+      while (w < group.first + group.count && layout_.windows[w].clip == layout_.windows[begin].clip) ++w;
+      const int first = layout_.windows[begin].first;
+      const int count = layout_.windows[w - 1].first + layout_.windows[w - 1].points - first;
+      Clip decoded = empty_clip(table_.clips[clip], first, count);
+      PoseWriter writer(tables_.reference, table_.clips[clip].placement, decoded);
+      for (std::size_t i = begin; i < w; ++i) write_window(values, i - group.first, i, first, writer);
+      append_joint_errors(originals[clip], decoded, first, count, 0, out.emplace_back(RunErrors{clip, {}}).joints);
+    }
+    return out;
+  }
+
   struct GroupValues {
     std::vector<double> values;
     std::vector<std::size_t> offsets;
@@ -204,6 +255,11 @@ std::unique_ptr<StreamReader> MotionSpaceCodec::open(Bitstream stream, const Mot
                                    .remedy = "name the library that it was encoded with by --basis"});
   }
   return std::make_unique<MotionSpaceReader>(std::move(stream), basis);
+}
+
+ClipErrorSums decoded_error(std::span<const std::byte> stream, std::span<const Clip> originals,
+                            const MotionSpaceBasis* basis) {
+  return MotionSpaceReader(Bitstream::parse(stream, "the stream"), basis).error_of(originals);
 }
 
 std::unique_ptr<StreamReader> MotionSpaceCodec::open(Bitstream stream) const {

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "base/error.h"
-#include "codecs/motion_space_codec.h"
+#include "codecs/codec.h"
 
 namespace kinespace {
 namespace {
@@ -28,7 +28,7 @@ MotionSpaceSearch::MotionSpaceSearch(std::span<const Clip> clips, const Progress
 
 Bytes MotionSpaceSearch::at_step(double step) {
   settle(step);
-  return finish(encoder_.attempt(step, settings_, &*last_));
+  return encoder_.finish(encoder_.attempt(step, settings_, &*last_));
 }
 
 Bytes MotionSpaceSearch::for_mean_error(double target) {
@@ -52,7 +52,7 @@ Bytes MotionSpaceSearch::for_mean_error(double target) {
       continue;
     }
     if (met && (close || round > 4)) {
-      Bytes out = finish(attempt);
+      Bytes out = encoder_.finish(attempt);
       if (Bitstream::parse(out, "").error().mean_joint_error_cm <= target) return out;
     }
     if (!met) goal = std::min(goal, target) * 0.998;
@@ -86,7 +86,7 @@ Bytes MotionSpaceSearch::for_bytes(std::int64_t target) {
   double too_fine = 0;  // the coarsest known not to
   constexpr int most_rounds = 16;
   for (int round = 0; round < most_rounds; ++round) {
-    Bytes out = finish(encoder_.attempt(step, settings_, &*last_));
+    Bytes out = encoder_.finish(encoder_.attempt(step, settings_, &*last_));
     const auto size = static_cast<std::int64_t>(out.size());
     if (size <= target) {
       if (out.size() > best.size()) best = std::move(out);
@@ -172,19 +172,11 @@ Bytes MotionSpaceSearch::refine(double step, double target) {
       if (finer[w] > finest_block) return {};
     }
     if (!met) continue;
-    Bytes out = finish(attempt);
+    Bytes out = encoder_.finish(attempt);
     if (Bitstream::parse(out, "").error().max_joint_error_cm <= target) return out;
     target *= 0.999;
   }
   return {};
-}
-
-// Writes the stream with the errors of what a reader decodes from it.
-Bytes MotionSpaceSearch::finish(const Attempt& attempt) const {
-  const Bytes draft = write_stream(attempt, {}, basis_);
-  const auto reader = MotionSpaceCodec().open(Bitstream::parse(draft, "the stream"), basis_);
-  const std::vector<Clip> decoded = reader->decode_all();
-  return write_stream(attempt, encoder_.error_of(decoded).measured(), basis_);
 }
 
 MotionSpaceTables MotionSpaceSearch::tables_at(double step, bool all_components) {

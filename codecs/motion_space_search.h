@@ -32,7 +32,6 @@ class MotionSpaceSearch {
   double approach(double step, double target);
   double balance(double step, std::optional<double> target);
   Bytes refine(double step, double target);
-  Bytes finish(const Attempt& attempt) const;
 
   MotionSpaceEncoder encoder_;
   MotionSpaceSettings settings_;

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include <Eigen/Eigenvalues>
+#include <tbb/parallel_for.h>
 
 #include "base/error.h"
 #include "codecs/natural_functions.h"
@@ -22,20 +23,53 @@ Eigen::Quaterniond about_vertical(double angle) {
   return {cosine, 0, sine, 0};
 }
 
-Eigen::Quaterniond curve_quaternion(const ClipCurves& curves, int frame, int joint) {
-  const auto q = curves.values.row(frame).segment<4>(3 + 4 * joint);
+// The curves of the travel root and the side tracks of what stands above it: those of the clip without what is below,
+// as the joints above are the first of the skeleton.
+ClipCurves root_curves(const Clip& clip) {
+  const int joints = clip.skeleton.travel_root() + 1;
+  Clip chain{.name = clip.name, .skeleton = clip.skeleton, .rate_hz = clip.rate_hz, .frames = clip.frames};
+  chain.skeleton.joints.resize(static_cast<std::size_t>(joints));
+  const std::size_t numbers = static_cast<std::size_t>(joints) * 4 * static_cast<std::size_t>(clip.frames);
+  chain.rotations.assign(clip.rotations.begin(), clip.rotations.begin() + static_cast<std::ptrdiff_t>(numbers));
+  for (const Clip::TranslationTrack& track : clip.translations) {
+    if (track.joint < joints) chain.translations.push_back(track);
+  }
+  return clip_curves(chain);
+}
+
+// The side track of a joint below the travel root: that of a clip in which nothing else moves.
+SideTrack side_track_below(const Clip& clip, const Clip::TranslationTrack& track) {
+  const Skeleton root_and_joint{.joints = {{.name = "root"}, {.name = "joint", .parent = 0}}};
+  Clip alone = make_clip(clip.name, root_and_joint, clip.rate_hz, clip.frames);
+  alone.translations.push_back({1, track.values});
+  SideTrack out = clip_curves(alone).side_tracks.front();
+  out.joint = track.joint;
+  return out;
+}
+
+// Of the whole clip: rotations, then translations, each by joint.
+std::vector<SideTrack> all_side_tracks(const Clip& clip, std::vector<SideTrack> of_root) {
+  std::vector<SideTrack> out = std::move(of_root);
+  for (const Clip::TranslationTrack& track : clip.translations) {
+    if (track.joint > clip.skeleton.travel_root()) out.push_back(side_track_below(clip, track));
+  }
+  return out;
+}
+
+Eigen::Quaterniond root_quaternion(const ClipCurves& root, std::size_t frame) {
+  const auto q = root.values.row(static_cast<Eigen::Index>(frame)).segment<4>(3);
   return {q(0), q(1), q(2), q(3)};
 }
 
 // Twist about the vertical, unwrapped; across frames where it is ill defined (the root turned over by more than 140
 // degrees) a straight line.
-std::vector<double> headings(const ClipCurves& curves, const Eigen::Quaterniond& turn) {
+std::vector<double> headings(const ClipCurves& root, const Eigen::Quaterniond& turn) {
   constexpr double defined = 0.34;  // cosine of half of 140 degrees
-  const int frames = curves.frames();
+  const int frames = root.frames();
   std::vector<double> out(static_cast<std::size_t>(frames), 0.0);
   int last = -1;
   for (int f = 0; f < frames; ++f) {
-    const Eigen::Quaterniond q = turn * curve_quaternion(curves, f, 0);
+    const Eigen::Quaterniond q = turn * root_quaternion(root, static_cast<std::size_t>(f));
     if (std::hypot(q.w(), q.y()) < defined) continue;
     double angle = 2 * std::atan2(q.y(), q.w());
     const double before = last < 0 ? 0 : out[static_cast<std::size_t>(last)];
@@ -67,6 +101,80 @@ CoarsePlacement place(const ClipCurves& curves) {
   const double turns = curves.placement.heading_rad / (2 * std::numbers::pi);
   out.heading = static_cast<std::int32_t>(std::lround(turns * CoarsePlacement::steps_per_turn));
   return out;
+}
+
+// The travel root in the clip's own frame.
+struct RootPath {
+  explicit RootPath(const ClipCurves& root)
+      : placement(place(root)),
+        from_curves(about_vertical(root.placement.heading_rad)),
+        turn(placement.turn().conjugate() * from_curves),
+        heading(headings(root, turn)) {}
+
+  // An orientation of the root's curve without its heading.
+  [[nodiscard]] Eigen::Quaterniond without_heading(const Eigen::Quaterniond& q, std::size_t frame) const {
+    return about_vertical(-heading[frame]) * turn * q;
+  }
+
+  // Dimensions 0 to 3 of `values`, [dimension][frame].
+  void write(const ClipCurves& root, std::span<double> values) const {
+    const std::size_t n = heading.size();
+    const Eigen::Quaterniond back = placement.turn().conjugate();
+    for (std::size_t f = 0; f < n; ++f) {
+      const Eigen::Vector3d travel = 100 * root.values.row(static_cast<Eigen::Index>(f)).head<3>().transpose();
+      const Eigen::Vector3d p = back * (root.placement.start_cm + from_curves * travel - placement.start_cm());
+      for (std::size_t k = 0; k < 3; ++k) values[k * n + f] = p[static_cast<Eigen::Index>(k)];
+    }
+    std::ranges::copy(heading, values.begin() + static_cast<std::ptrdiff_t>(3 * n));
+  }
+
+  CoarsePlacement placement;
+  Eigen::Quaterniond from_curves;
+  Eigen::Quaterniond turn;
+  std::vector<double> heading;
+};
+
+void add_outer(const Eigen::Quaterniond& q, Eigen::Matrix4d& sum) {
+  const Eigen::Vector4d v(q.w(), q.x(), q.y(), q.z());
+  sum += v * v.transpose();
+}
+
+void add_root(const Clip& clip, Eigen::Matrix4d& sum) {
+  const ClipCurves root = root_curves(clip);
+  const RootPath path(root);
+  for (std::size_t f = 0; f < path.heading.size(); ++f) {
+    add_outer(path.without_heading(root_quaternion(root, f), f), sum);
+  }
+}
+
+std::array<std::int8_t, 3> reference_steps(const Eigen::Matrix4d& sum) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
+  Eigen::Vector4d q = solver.eigenvectors().col(3);
+  if (q[0] < 0) q = -q;
+  std::array<std::int8_t, 3> steps{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double component = q[static_cast<Eigen::Index>(k) + 1];
+    steps[k] = std::isfinite(component) ? static_cast<std::int8_t>(std::lround(127 * component)) : std::int8_t{0};
+  }
+  return steps;
+}
+
+void require_finite(const Clip& clip, bool finite) {
+  if (finite) return;
+  throw Error(ErrorKind::bad_input,
+              {.file = clip.name, .found = "a value that is no number", .expected = "finite rotations and positions"});
+}
+
+// The orientations of a joint other than the travel root, without sign flips from frame to frame.
+void unit_turns(const Clip& clip, int joint, std::span<Eigen::Quaterniond> out) {
+  Eigen::Quaterniond before = clip.rotation(joint, 0);
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    Eigen::Quaterniond q = clip.rotation(joint, static_cast<int>(f));
+    require_finite(clip, q.coeffs().allFinite());
+    if (q.coeffs().dot(before.coeffs()) < 0) q.coeffs() *= -1;
+    before = q;
+    out[f] = q.normalized();
+  }
 }
 
 // The parameters of one joint over time; marks the frames where the other quaternion takes over.
@@ -125,68 +233,45 @@ Eigen::Quaterniond CoarsePlacement::turn() const {
   return about_vertical(2 * std::numbers::pi * heading / steps_per_turn);
 }
 
-ReferencePoseBuilder::ReferencePoseBuilder(const Skeleton& skeleton)
-    : sums_(skeleton.rotating_joints().size(), Eigen::Matrix4d::Zero()) {}
-
-void ReferencePoseBuilder::add(const ClipCurves& curves) {
-  const CoarsePlacement placement = place(curves);
-  const Eigen::Quaterniond turn = placement.turn().conjugate() * about_vertical(curves.placement.heading_rad);
-  const std::vector<double> heading = headings(curves, turn);
-  for (int f = 0; f < curves.frames(); ++f) {
-    for (std::size_t j = 0; j < sums_.size(); ++j) {
-      Eigen::Quaterniond q = curve_quaternion(curves, f, static_cast<int>(j));
-      if (j == 0) q = about_vertical(-heading[static_cast<std::size_t>(f)]) * turn * q;
-      const Eigen::Vector4d v(q.w(), q.x(), q.y(), q.z());
-      sums_[j] += v * v.transpose();
-    }
-  }
-}
-
-ReferencePose ReferencePoseBuilder::build() const {
+ReferencePose reference_pose(std::span<const Clip> clips) {
+  const std::vector<int> joints = clips.front().skeleton.rotating_joints();
   ReferencePose out;
-  for (const Eigen::Matrix4d& sum : sums_) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(sum);
-    Eigen::Vector4d q = solver.eigenvectors().col(3);
-    if (q[0] < 0) q = -q;
-    std::array<std::int8_t, 3> steps{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double component = q[static_cast<Eigen::Index>(k) + 1];
-      steps[k] = std::isfinite(component) ? static_cast<std::int8_t>(std::lround(127 * component)) : std::int8_t{0};
+  out.steps.resize(joints.size());
+  tbb::parallel_for(std::size_t{0}, joints.size(), [&](std::size_t j) {
+    Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
+    for (const Clip& clip : clips) {
+      if (j == 0) {
+        add_root(clip, sum);
+      } else {
+        for (int f = 0; f < clip.frames; ++f) add_outer(clip.rotation(joints[j], f), sum);
+      }
     }
-    out.steps.push_back(steps);
-  }
+    out.steps[j] = reference_steps(sum);
+  });
   return out;
 }
 
-PoseVectors pose_vectors(const ClipCurves& curves, const ReferencePose& reference) {
-  PoseVectors out{.frames = curves.frames(), .placement = place(curves), .side_tracks = curves.side_tracks};
+PoseVectors pose_vectors(const Clip& clip, const ReferencePose& reference) {
+  ClipCurves root = root_curves(clip);
+  const RootPath path(root);
+  require_finite(clip, root.values.allFinite());
+  PoseVectors out{.frames = clip.frames, .placement = path.placement};
+  out.side_tracks = all_side_tracks(clip, std::move(root.side_tracks));
   const auto n = static_cast<std::size_t>(out.frames);
-  if (!curves.values.allFinite()) {
-    throw Error(
-        ErrorKind::bad_input,
-        {.file = curves.name, .found = "a value that is no number", .expected = "finite rotations and positions"});
-  }
   out.values.resize(static_cast<std::size_t>(reference.dimensions()) * n);
-  const Eigen::Quaterniond back = out.placement.turn().conjugate();
-  const Eigen::Quaterniond from_curves = about_vertical(curves.placement.heading_rad);
-  const Eigen::Quaterniond turn = back * from_curves;
-  const std::vector<double> heading = headings(curves, turn);
-  std::ranges::copy(heading, out.values.begin() + static_cast<std::ptrdiff_t>(3 * n));
-  for (std::size_t f = 0; f < n; ++f) {
-    const Eigen::Vector3d travel = 100 * curves.values.row(static_cast<Eigen::Index>(f)).head<3>().transpose();
-    const Eigen::Vector3d p = back * (curves.placement.start_cm + from_curves * travel - out.placement.start_cm());
-    for (std::size_t k = 0; k < 3; ++k) out.values[k * n + f] = p[static_cast<Eigen::Index>(k)];
-  }
+  path.write(root, out.values);
+  const std::vector<int> joints = clip.skeleton.rotating_joints();
   std::vector<bool> jumps(n, false);
   std::vector<Eigen::Quaterniond> turns(n);
-  for (int j = 0; j < reference.joint_count(); ++j) {
-    const Eigen::Quaterniond from = reference.orientation(j).conjugate();
-    for (std::size_t f = 0; f < n; ++f) {
-      Eigen::Quaterniond q = curve_quaternion(curves, static_cast<int>(f), j).normalized();
-      if (j == 0) q = about_vertical(-heading[f]) * turn * q;
-      turns[f] = from * q;
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    if (j == 0) {
+      for (std::size_t f = 0; f < n; ++f) turns[f] = path.without_heading(root_quaternion(root, f).normalized(), f);
+    } else {
+      unit_turns(clip, joints[j], turns);
     }
-    joint_parameters(turns, std::span(out.values).subspan(static_cast<std::size_t>(4 + 3 * j) * n, 3 * n), jumps);
+    const Eigen::Quaterniond from = reference.orientation(static_cast<int>(j)).conjugate();
+    for (Eigen::Quaterniond& turn : turns) turn = from * turn;
+    joint_parameters(turns, std::span(out.values).subspan((4 + 3 * j) * n, 3 * n), jumps);
   }
   for (std::size_t f = 1; f < n; ++f) {
     if (jumps[f]) out.jumps.push_back(static_cast<int>(f));
@@ -196,7 +281,10 @@ PoseVectors pose_vectors(const ClipCurves& curves, const ReferencePose& referenc
 
 void apply_side_track(const SideTrack& track, int first, Clip& clip) {
   const auto d = static_cast<std::size_t>(track.dimensions);
-  std::size_t piece = 0;
+  // The knot before `first`, but for the last one.
+  const auto later = std::ranges::upper_bound(track.frames.begin() + 1, track.frames.end(), first);
+  auto piece = static_cast<std::size_t>(later - track.frames.begin()) - 1;
+  if (piece > 0 && piece + 1 == track.frames.size()) --piece;
   std::array<double, 4> v{};
   for (int f = 0; f < clip.frames; ++f) {
     const int frame = first + f;

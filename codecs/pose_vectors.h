@@ -62,20 +62,13 @@ struct PoseVectors {
   }
 };
 
-// Sums of the orientations that clips show, from which the reference pose is taken: for each joint the mean orientation
-// (the eigenvector of the largest eigenvalue of sum q q').
-class ReferencePoseBuilder {
- public:
-  explicit ReferencePoseBuilder(const Skeleton& skeleton);
-  void add(const ClipCurves& curves);
-  [[nodiscard]] ReferencePose build() const;
+// The reference pose of clips of one tree: for each joint the mean of the orientations that they show (the eigenvector
+// of the largest eigenvalue of sum q q').
+[[nodiscard]] ReferencePose reference_pose(std::span<const Clip> clips);
 
- private:
-  std::vector<Eigen::Matrix4d> sums_;
-};
-
-// Throws Error{bad_input} naming the clip when a value is not finite or a position lies farther than 1e7 cm away.
-[[nodiscard]] PoseVectors pose_vectors(const ClipCurves& curves, const ReferencePose& reference);
+// A joint at a time: beside the vectors no more than a few numbers a frame are held. Throws Error{bad_input} naming the
+// clip when a value is not finite or a position lies farther than 1e7 cm away.
+[[nodiscard]] PoseVectors pose_vectors(const Clip& clip, const ReferencePose& reference);
 
 // Puts a side track onto a clip that holds the frames from `first` on of the clip that it was made for.
 void apply_side_track(const SideTrack& track, int first, Clip& clip);

@@ -115,12 +115,14 @@ class StretchPlan {
 }  // namespace
 
 std::vector<int> find_jumps(const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& curves,
-                            std::vector<int> jumps) {
+                            double unit_cm, std::vector<int> jumps) {
   constexpr double break_cm = 10;
   constexpr double break_ratio = 4;
   const Eigen::Index n = curves.cols();
   std::vector<double> travel(static_cast<std::size_t>(n), 0.0);
-  for (Eigen::Index f = 1; f < n; ++f) travel[static_cast<std::size_t>(f)] = (curves.col(f) - curves.col(f - 1)).norm();
+  for (Eigen::Index f = 1; f < n; ++f) {
+    travel[static_cast<std::size_t>(f)] = (curves.col(f) * unit_cm - curves.col(f - 1) * unit_cm).norm();
+  }
   for (std::size_t f = 1; f < travel.size(); ++f) {
     const double before = f > 1 ? travel[f - 1] : 0;
     const double after = f + 1 < travel.size() ? travel[f + 1] : 0;

@@ -16,9 +16,10 @@
 namespace kinespace {
 
 // Frames where a body is suddenly elsewhere, beside those in `jumps`: ascending. `curves`: [curve][frame], whitened, so
-// that the distance from frame to frame is that of the joints together, in cm.
+// that the distance from frame to frame is that of the joints together, in units of `unit_cm`.
 [[nodiscard]] std::vector<int> find_jumps(
-    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& curves, std::vector<int> jumps);
+    const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>& curves, double unit_cm,
+    std::vector<int> jumps);
 
 struct BlockPlanOptions {
   double grid_s = 0.5;       // window ends lie on multiples of this, in seconds, but for jumps and the end

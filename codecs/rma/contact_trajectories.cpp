@@ -49,26 +49,52 @@ struct Resting {
   double height = 0;
 };
 
-std::vector<Resting> resting_joints(const JointPositions& positions) {
+// take(frame, positions of all joints at it), some frames of the clip at a time.
+template <typename Take>
+void visit_positions(const Clip& clip, const Take& take) {
+  constexpr int block = 1024;
+  for (int first = 0; first < clip.frames; first += block) {
+    const JointPositions positions = joint_positions(slice(clip, first, std::min(block, clip.frames - first)));
+    for (int f = 0; f < positions.frames; ++f) {
+      take(static_cast<std::size_t>(first + f), &positions.at(f, 0));
+    }
+  }
+}
+
+std::vector<Resting> resting_joints(const Clip& clip) {
+  const auto joints = static_cast<std::size_t>(clip.skeleton.joint_count());
+  std::vector<std::vector<double>> heights(joints, std::vector<double>(static_cast<std::size_t>(clip.frames)));
+  visit_positions(clip, [&](std::size_t frame, const Eigen::Vector3d* positions) {
+    for (std::size_t j = 0; j < joints; ++j) heights[j][frame] = positions[j].y();
+  });
   std::vector<Resting> out;
   double floor = std::numeric_limits<double>::infinity();
-  std::vector<double> heights(static_cast<std::size_t>(positions.frames));
-  for (int j = 0; j < positions.joints; ++j) {
-    for (int f = 0; f < positions.frames; ++f) heights[static_cast<std::size_t>(f)] = positions.at(f, j).y();
-    out.push_back({j, lowest_cluster(heights)});
+  for (std::size_t j = 0; j < joints; ++j) {
+    out.push_back({static_cast<int>(j), lowest_cluster(heights[j])});
     floor = std::min(floor, out.back().height);
   }
   std::erase_if(out, [&](const Resting& r) { return r.height > floor + reach_of_floor_cm; });
   return out;
 }
 
+// By resting joint: where it is at every frame.
+std::vector<std::vector<Eigen::Vector3d>> paths_of(const Clip& clip, std::span<const Resting> resting) {
+  std::vector<std::vector<Eigen::Vector3d>> out(resting.size(),
+                                                std::vector<Eigen::Vector3d>(static_cast<std::size_t>(clip.frames)));
+  visit_positions(clip, [&](std::size_t frame, const Eigen::Vector3d* positions) {
+    for (std::size_t r = 0; r < resting.size(); ++r) out[r][frame] = positions[resting[r].joint];
+  });
+  return out;
+}
+
 // cm/s, over 80 ms about the frame.
-double speed_at(const JointPositions& positions, double rate_hz, int frame, int joint) {
+double speed_at(std::span<const Eigen::Vector3d> path, double rate_hz, int frame) {
   const int reach = std::max(1, static_cast<int>(0.04 * rate_hz));
   const int first = std::max(0, frame - reach);
-  const int last = std::min(positions.frames - 1, frame + reach);
+  const int last = std::min(static_cast<int>(path.size()) - 1, frame + reach);
   if (first == last) return 0;
-  return (positions.at(last, joint) - positions.at(first, joint)).norm() * rate_hz / (last - first);
+  return (path[static_cast<std::size_t>(last)] - path[static_cast<std::size_t>(first)]).norm() * rate_hz /
+         (last - first);
 }
 
 std::int8_t steps(double value, double step, int most) {
@@ -87,19 +113,20 @@ void ContactOptions::validate() const {
 
 std::vector<ContactTrack> find_contacts(const Clip& clip, const ContactOptions& options) {
   options.validate();
-  const JointPositions positions = joint_positions(clip);
+  const std::vector<Resting> resting = resting_joints(clip);
+  const std::vector<std::vector<Eigen::Vector3d>> paths = paths_of(clip, resting);
   const auto shortest = static_cast<std::size_t>(std::max(2.0, std::ceil(options.shortest_s * clip.rate_hz)));
   std::vector<ContactTrack> out;
-  for (const Resting& rest : resting_joints(positions)) {
-    ContactTrack track{.joint = rest.joint, .first = 0, .points = {}};
+  for (std::size_t r = 0; r < resting.size(); ++r) {
+    ContactTrack track{.joint = resting[r].joint, .first = 0, .points = {}};
     const auto finish = [&] {
       if (track.points.size() >= shortest) out.push_back(track);
       track.points.clear();
     };
     for (int f = 0; f < clip.frames; ++f) {
-      const Eigen::Vector3d& p = positions.at(f, rest.joint);
-      const bool near = std::abs(p.y() - rest.height) <= options.near_cm;
-      const bool touches = near || speed_at(positions, clip.rate_hz, f, rest.joint) <= options.slow_cm_s;
+      const Eigen::Vector3d& p = paths[r][static_cast<std::size_t>(f)];
+      const bool near = std::abs(p.y() - resting[r].height) <= options.near_cm;
+      const bool touches = near || speed_at(paths[r], clip.rate_hz, f) <= options.slow_cm_s;
       const bool moved = !track.points.empty() && (p - track.points.back()).norm() > options.move_cm;
       if (!touches || moved) finish();
       if (!touches) continue;

@@ -98,7 +98,7 @@ void MarkerEncoder::fill_markers() {
   markers_.values.resize(d * static_cast<std::size_t>(markers_.frames));
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
     std::vector<double> markers(d * static_cast<std::size_t>(clips_[c].frames));
-    clip_markers(aligned_, c, MarkerDecoder::alignment(roots_[c], root_span_), markers.data());
+    clip_markers(aligned_, c, MarkerDecoder::alignment(roots_[c], root_span_), 0, clips_[c].frames, markers.data());
     std::ranges::transform(markers, markers_.values.begin() + static_cast<std::ptrdiff_t>(d) * markers_.starts[c],
                            [](double v) { return static_cast<float>(v); });
   });

@@ -182,22 +182,18 @@ AlignedClips align_clips(std::span<const Clip> clips) {
   for (const Skeleton& skeleton : table.skeletons) out.rigs.emplace_back(skeleton);
   if (clips.empty()) return out;
   out.rate_hz = clips.front().rate_hz;
-  std::vector<ClipCurves> curves(clips.size());
-  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) { curves[c] = clip_curves(clips[c]); });
-  ReferencePoseBuilder builder(table.skeletons.front());
-  for (const ClipCurves& one : curves) builder.add(one);
-  out.reference = builder.build();
+  out.reference = reference_pose(clips);
   out.vectors.resize(clips.size());
   out.degrees.resize(clips.size());
   tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
-    out.vectors[c] = pose_vectors(curves[c], out.reference);
+    out.vectors[c] = pose_vectors(clips[c], out.reference);
     out.degrees[c] = alignment_degrees(out.vectors[c], out.reference);
   });
   return out;
 }
 
-void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignment& alignment, double* out,
-                  bool with_joints) {
+void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignment& alignment, int first, int count,
+                  double* out, bool with_joints) {
   const PoseVectors& vectors = clips.vectors[clip];
   const MarkerRig& rig = clips.rigs[static_cast<std::size_t>(clips.rig[clip])];
   const auto frames = static_cast<std::size_t>(vectors.frames);
@@ -207,7 +203,8 @@ void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignme
   for (std::size_t j = 0; j < joints; ++j) reference.push_back(clips.reference.orientation(static_cast<int>(j)));
   std::vector<Eigen::Quaterniond> rotations(joints);
   std::array<double, 7> at{};
-  for (std::size_t f = 0; f < frames; ++f) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    const std::size_t f = static_cast<std::size_t>(first) + i;
     for (int c = 0; c < curve_count; ++c) at[static_cast<std::size_t>(c)] = alignment.curve(c)[f];
     const RigidFrame frame =
         alignment_frame(std::span(at).first(static_cast<std::size_t>(curve_count)), clips.reference);
@@ -222,7 +219,7 @@ void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignme
         frame.turn.conjugate() * (Eigen::Vector3d(v[0], v[frames], v[2 * frames]) - frame.position);
     const auto d = static_cast<std::size_t>(rig.dimensions());
     const std::size_t stride = d + (with_joints ? 3 * joints : 0);
-    rig.place(root, rotations, {out + f * stride, d}, {out + f * stride + d, stride - d});
+    rig.place(root, rotations, {out + i * stride, d}, {out + i * stride + d, stride - d});
   }
 }
 
@@ -237,10 +234,18 @@ FrameTable marker_table(const AlignedClips& clips) {
   const auto d = static_cast<std::size_t>(out.dimensions);
   out.values.resize(d * static_cast<std::size_t>(out.frames));
   tbb::parallel_for(std::size_t{0}, clips.vectors.size(), [&](std::size_t c) {
-    std::vector<double> markers(d * static_cast<std::size_t>(clips.vectors[c].frames));
-    clip_markers(clips, c, root_alignment(clips.vectors[c], clips.degrees[c]), markers.data());
-    std::ranges::transform(markers, out.values.begin() + static_cast<std::ptrdiff_t>(d) * out.starts[c],
-                           [](double v) { return static_cast<float>(v); });
+    // As doubles only some frames at a time.
+    constexpr int block = 1024;
+    const RootAlignment alignment = root_alignment(clips.vectors[c], clips.degrees[c]);
+    const int blocks = (clips.vectors[c].frames + block - 1) / block;
+    tbb::parallel_for(0, blocks, [&](int b) {
+      const int first = b * block;
+      const int count = std::min(block, clips.vectors[c].frames - first);
+      std::vector<double> markers(d * static_cast<std::size_t>(count));
+      clip_markers(clips, c, alignment, first, count, markers.data());
+      std::ranges::transform(markers, out.values.begin() + static_cast<std::ptrdiff_t>(d) * (out.starts[c] + first),
+                             [](double v) { return static_cast<float>(v); });
+    });
   });
   return out;
 }

@@ -79,10 +79,10 @@ struct AlignedClips {
 // Throws Error{bad_input} for values that are no numbers, Error{usage} for clips of different trees.
 [[nodiscard]] AlignedClips align_clips(std::span<const Clip> clips);
 
-// The markers of one clip, [frame][dimension], in the frames that an alignment gives (that of the decoder, say).
-// `with_joints`: behind them, in each frame, where the rotating joints are.
-void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignment& alignment, double* out,
-                  bool with_joints = false);
+// The markers of frames [first, first + count) of one clip, [frame][dimension], in the frames that an alignment gives
+// (that of the decoder, say). `with_joints`: behind them, in each frame, where the rotating joints are.
+void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignment& alignment, int first, int count,
+                  double* out, bool with_joints = false);
 
 // The markers of all clips, one after the other, aligned exactly.
 [[nodiscard]] FrameTable marker_table(const AlignedClips& clips);

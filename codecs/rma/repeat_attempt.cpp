@@ -179,6 +179,7 @@ RepeatAttempt RepeatEncoder::attempt(double step, bool predict) const {
     tables.predicted.spectrum = tables.tables.coding.spectrum;
     coding.layout = std::make_unique<RepeatLayout>(coding.attempt.clips, tables);
   }
+  coding.wanted.clear();
   measure(coding);
   for (const auto& group : coding.layers) {
     ByteWriter out;

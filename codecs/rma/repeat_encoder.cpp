@@ -101,12 +101,12 @@ void RepeatEncoder::add_statistics() {
 void RepeatEncoder::cut(std::size_t clip, double step) {
   const int d = aligned_.reference.dimensions();
   const int planned = std::min(planned_components, d);
-  const RowMatrix z = (exact_.basis.transpose() * metric_).topRows(planned) * curves_of(aligned_.vectors[clip], d);
+  RowMatrix z = (exact_.basis.transpose() * metric_).topRows(planned) * curves_of(aligned_.vectors[clip], d);
   ClipEntry& entry = table_.clips[clip];
-  const std::vector<int> jumps = find_jumps(z, aligned_.vectors[clip].jumps);
-  const RowMatrix scaled = z / step;
-  entry.blocks = plan_blocks({scaled.data(), static_cast<std::size_t>(scaled.size())}, planned, entry.frames,
-                             entry.rate_hz, jumps, {.longest_frames = longest_block});
+  const std::vector<int> jumps = find_jumps(z, 1, aligned_.vectors[clip].jumps);
+  z /= step;
+  entry.blocks = plan_blocks({z.data(), static_cast<std::size_t>(z.size())}, planned, entry.frames, entry.rate_hz,
+                             jumps, {.longest_frames = longest_block});
   entry.finer.assign(entry.blocks.size(), 0);
 }
 
@@ -119,7 +119,7 @@ void RepeatEncoder::plan(double step) {
     const int d = aligned_.reference.dimensions();
     const Curves x = curves_of(aligned_.vectors[c], d);
     const RowMatrix analysis = (exact_.basis.transpose() * metric_).topRows(std::min(planned_components, d));
-    const std::vector<int> jumps = find_jumps(analysis * x, aligned_.vectors[c].jumps);
+    const std::vector<int> jumps = find_jumps(analysis * x, 1, aligned_.vectors[c].jumps);
     int first = 0;
     for (const int points : table_.clips[c].blocks) {
       windows_.push_back({.clip = static_cast<int>(c), .first = first, .points = points});

@@ -17,6 +17,48 @@ constexpr int point_context = jump_context + 1;
 constexpr int limit_context = point_context + 1;
 constexpr int context_count = limit_context + 1;
 
+// The vectors of a window, of the one before and of the one after: all that its frames are smoothed by.
+class NearWindows {
+ public:
+  explicit NearWindows(std::span<const WindowPlace> windows) : windows_(windows) {}
+
+  // The window after the last that was added; `first` when there is none.
+  [[nodiscard]] std::size_t end(std::size_t first) const { return held_.empty() ? first : held_.back().window + 1; }
+  void add(std::size_t window, std::vector<double> vectors) {
+    if (held_.size() == 3) held_.erase(held_.begin());
+    held_.push_back({window, std::move(vectors)});
+  }
+  [[nodiscard]] std::span<const double> vectors(std::size_t window) const {
+    return std::ranges::find(held_, window, &Held::window)->vectors;
+  }
+  void get(int frame, std::span<double> out) {
+    visit(frame, [&](std::size_t k, const double& value) { out[k] = value; });
+  }
+  void set(int frame, std::span<const double> values) {
+    visit(frame, [&](std::size_t k, double& value) { value = values[k]; });
+  }
+
+ private:
+  struct Held {
+    std::size_t window = 0;
+    std::vector<double> vectors;  // [dimension][point]
+  };
+
+  template <typename Take>
+  void visit(int frame, const Take& take) {
+    for (Held& held : held_) {
+      const WindowPlace& place = windows_[held.window];
+      if (frame < place.first || frame >= place.first + place.points) continue;
+      const auto points = static_cast<std::size_t>(place.points);
+      double* const at = held.vectors.data() + (frame - place.first);
+      for (std::size_t k = 0; k < held.vectors.size() / points; ++k) take(k, at[k * points]);
+    }
+  }
+
+  std::span<const WindowPlace> windows_;
+  std::vector<Held> held_;
+};
+
 }  // namespace
 
 Bytes pack_repeats(const RepeatTables& tables, const ClipTable& clips) {
@@ -165,45 +207,33 @@ ClipSeams RepeatDecoder::seams(std::size_t clip) const {
   return out;
 }
 
-void RepeatDecoder::smooth_seams(std::size_t clip, std::vector<double>& vectors) const {
-  const ClipEntry& entry = clips_.clips[clip];
-  const auto frames = static_cast<std::size_t>(entry.frames);
-  const std::size_t dimensions = vectors.size() / frames;
-  const auto [inner, jumps] = seams(clip);
-  if (inner.empty()) return;
-  const auto get = [&](int frame, std::span<double> out) {
-    for (std::size_t k = 0; k < dimensions; ++k) out[k] = vectors[k * frames + static_cast<std::size_t>(frame)];
-  };
-  std::vector<double> frame(dimensions);
-  SeamSmoother smoother(static_cast<int>(dimensions), entry.frames, inner, seam_smoothing_s * entry.rate_hz, get,
-                        jumps);
-  for (int f = 0; f < entry.frames; ++f) {
-    if (!smoother.touches(f)) continue;
-    get(f, frame);
-    smoother.apply(f, frame);
-    for (std::size_t k = 0; k < dimensions; ++k) vectors[k * frames + static_cast<std::size_t>(f)] = frame[k];
-  }
-}
-
 Clip RepeatDecoder::decode_without_contacts(std::size_t clip) const {
   const ClipEntry& entry = clips_.clips[clip];
-  const auto frames = static_cast<std::size_t>(entry.frames);
-  const auto dimensions = static_cast<std::size_t>(tables_.tables.reference.dimensions());
-  std::vector<double> vectors(dimensions * frames);
-  for (std::size_t w = layout_.plain.first_of_clip[clip]; w < layout_.plain.first_of_clip[clip + 1]; ++w) {
-    const WindowPlace& window = layout_.plain.windows[w];
-    const std::vector<double> part = window_vectors(w);
-    for (std::size_t k = 0; k < dimensions; ++k) {
-      std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(k) * window.points, window.points,
-                  vectors.begin() + static_cast<std::ptrdiff_t>(k * frames) + window.first);
-    }
-  }
-  smooth_seams(clip, vectors);
   const Skeleton& bones = clips_.skeletons[static_cast<std::size_t>(entry.skeleton)];
   Clip out = make_clip(entry.name, bones, entry.rate_hz, entry.frames);
   out.require_translation_track(bones.travel_root());
   for (const SideTrack& track : entry.side_tracks) apply_side_track(track, 0, out);
-  PoseWriter(tables_.tables.reference, entry.placement, out).write(vectors, 0, entry.frames);
+  PoseWriter writer(tables_.tables.reference, entry.placement, out);
+
+  const auto dimensions = static_cast<std::size_t>(tables_.tables.reference.dimensions());
+  const std::size_t end = layout_.plain.first_of_clip[clip + 1];
+  NearWindows near(layout_.plain.windows);
+  const auto [inner, jumps] = seams(clip);
+  SeamSmoother smoother(
+      static_cast<int>(dimensions), entry.frames, inner, seam_smoothing_s * entry.rate_hz,
+      [&](int frame, std::span<double> values) { near.get(frame, values); }, jumps);
+  std::vector<double> values(dimensions);
+  for (std::size_t w = layout_.plain.first_of_clip[clip]; w < end; ++w) {
+    for (std::size_t ahead = near.end(w); ahead < std::min(w + 2, end); ++ahead) near.add(ahead, window_vectors(ahead));
+    const WindowPlace& window = layout_.plain.windows[w];
+    for (int f = window.first; f < window.first + window.points; ++f) {
+      if (!smoother.touches(f)) continue;
+      near.get(f, values);
+      smoother.apply(f, values);
+      near.set(f, values);
+    }
+    writer.write(near.vectors(w), window.first, window.points);
+  }
   return out;
 }
 

@@ -90,7 +90,6 @@ class RepeatDecoder {
 
  private:
   [[nodiscard]] std::vector<double> plain_part(std::size_t w) const;
-  void smooth_seams(std::size_t clip, std::vector<double>& vectors) const;
 
   const ClipTable& clips_;
   const RepeatTables& tables_;

@@ -189,14 +189,19 @@ class ChangeCounts {
 };
 
 void count_changes(const Clip& clip, std::span<const int> seams, ChangeCounts& counts) {
-  const JointPositions p = joint_positions(clip);
-  for (int f = 1; f + 1 < clip.frames; ++f) {
-    const bool at_seam = std::ranges::binary_search(seams, f) || std::ranges::binary_search(seams, f + 1);
-    if (at_seam) continue;
-    for (int j = 0; j < p.joints; ++j) {
-      const double after = (p.at(f + 1, j) - p.at(f, j)).norm();
-      const double before = (p.at(f, j) - p.at(f - 1, j)).norm();
-      counts.add(std::abs(after - before) * clip.rate_hz);
+  constexpr int block = 1024;
+  for (int first = 1; first + 1 < clip.frames; first += block) {
+    const int last = std::min(first + block, clip.frames - 1);
+    const JointPositions p = joint_positions(slice(clip, first - 1, last + 1 - (first - 1)));
+    for (int f = first; f < last; ++f) {
+      const bool at_seam = std::ranges::binary_search(seams, f) || std::ranges::binary_search(seams, f + 1);
+      if (at_seam) continue;
+      const int at = f - (first - 1);
+      for (int j = 0; j < p.joints; ++j) {
+        const double after = (p.at(at + 1, j) - p.at(at, j)).norm();
+        const double before = (p.at(at, j) - p.at(at - 1, j)).norm();
+        counts.add(std::abs(after - before) * clip.rate_hz);
+      }
     }
   }
 }

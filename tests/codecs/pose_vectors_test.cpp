@@ -14,11 +14,8 @@ namespace kinespace {
 namespace {
 
 Clip back_from_vectors(const Clip& clip) {
-  const ClipCurves curves = clip_curves(clip);
-  ReferencePoseBuilder builder(clip.skeleton);
-  builder.add(curves);
-  const ReferencePose reference = builder.build();
-  const PoseVectors vectors = pose_vectors(curves, reference);
+  const ReferencePose reference = reference_pose({&clip, 1});
+  const PoseVectors vectors = pose_vectors(clip, reference);
   Clip out = make_clip(clip.name, clip.skeleton, clip.rate_hz, clip.frames);
   for (const SideTrack& track : vectors.side_tracks) apply_side_track(track, 0, out);
   PoseWriter(reference, vectors.placement, out).write(vectors.values, 0, clip.frames);
@@ -48,10 +45,7 @@ TEST(PoseVectors, parameters_stay_small_and_jump_only_where_they_say) {
   for (int f = 0; f < clip.frames; ++f) {
     clip.set_rotation(5, f, Eigen::Quaterniond(Eigen::AngleAxisd(0.05 * f, Eigen::Vector3d::UnitX())));
   }
-  const ClipCurves curves = clip_curves(clip);
-  ReferencePoseBuilder builder(clip.skeleton);
-  builder.add(curves);
-  const PoseVectors vectors = pose_vectors(curves, builder.build());
+  const PoseVectors vectors = pose_vectors(clip, reference_pose({&clip, 1}));
   ASSERT_FALSE(vectors.jumps.empty());
   const int dimensions = static_cast<int>(vectors.values.size()) / clip.frames;
   for (int d = 4; d < dimensions; ++d) {
@@ -73,11 +67,9 @@ TEST(PoseVectors, clips_that_walk_off_in_other_directions_look_alike) {
     auto& p = turned.require_translation_track(0).values[static_cast<std::size_t>(f)];
     p = turn * p + Eigen::Vector3d(8000, 0, -1600);
   }
-  ReferencePoseBuilder builder(clip.skeleton);
-  builder.add(clip_curves(clip));
-  const ReferencePose reference = builder.build();
-  const PoseVectors a = pose_vectors(clip_curves(clip), reference);
-  const PoseVectors b = pose_vectors(clip_curves(turned), reference);
+  const ReferencePose reference = reference_pose({&clip, 1});
+  const PoseVectors a = pose_vectors(clip, reference);
+  const PoseVectors b = pose_vectors(turned, reference);
   for (std::size_t i = 0; i < a.values.size(); ++i) EXPECT_NEAR(a.values[i], b.values[i], 8.0);
   for (int d = 4; d < reference.dimensions(); ++d) {
     for (std::size_t f = 0; f < a.curve(d).size(); ++f) EXPECT_NEAR(a.curve(d)[f], b.curve(d)[f], 0.1);
@@ -86,11 +78,8 @@ TEST(PoseVectors, clips_that_walk_off_in_other_directions_look_alike) {
 
 TEST(PositionMetric, is_how_far_joints_and_their_shells_move) {
   const Clip clip = sample_library({.takes = 1}).front().clip;
-  const ClipCurves curves = clip_curves(clip);
-  ReferencePoseBuilder builder(clip.skeleton);
-  builder.add(curves);
-  const ReferencePose reference = builder.build();
-  const PoseVectors vectors = pose_vectors(curves, reference);
+  const ReferencePose reference = reference_pose({&clip, 1});
+  const PoseVectors vectors = pose_vectors(clip, reference);
   const int frame = clip.frames / 3;
   std::vector<double> pose;
   for (int d = 0; d < reference.dimensions(); ++d) pose.push_back(vectors.curve(d)[static_cast<std::size_t>(frame)]);
