@@ -31,6 +31,12 @@ void decode_or_error(std::span<const std::byte> bytes) {
 }  // namespace
 }  // namespace kinespace::fuzz
 
+// Before any input is timed.
+extern "C" int LLVMFuzzerInitialize(int* /*count*/, char*** /*arguments*/) {
+  static_cast<void>(kinespace::fuzz::parts());
+  return 0;
+}
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace kinespace;
   if (size == 0) return 0;

@@ -25,7 +25,7 @@ namespace {
 constexpr std::string_view reader = KINESPACE_FUZZ_READER;
 
 Clip sample_clip() {
-  return slice(sample_library({.takes = 1}).front().clip, 0, 12);
+  return slice(make_walk().clip, 0, 12);
 }
 
 // Where a library under test lies: its reader wants a file.
@@ -37,7 +37,7 @@ const std::filesystem::path& scratch() {
 
 std::string sample_library_bytes() {
   const std::filesystem::path clip = scratch().string() + ".bvh", library = scratch().string() + ".kspace";
-  write_clip(clip, slice(sample_library({.takes = 1}).front().clip, 0, 60));
+  write_clip(clip, slice(make_walk().clip, 0, 60));
   static_cast<void>(build_library({clip}, library, {}));
   const FileContent content(library);
   std::string out(content.text());
@@ -56,6 +56,11 @@ const std::string& good() {
   return text;
 }
 
+const Asf& skeleton() {
+  static const Asf asf = parse_asf(format_amc(sample_clip()).asf, "good.asf");
+  return asf;
+}
+
 void read_library(std::string_view bytes) {
   {
     std::ofstream out(scratch(), std::ios::binary | std::ios::trunc);
@@ -71,8 +76,7 @@ void read(std::string_view text) {
   } else if (reader == "asf") {
     static_cast<void>(parse_asf(text, "fuzzed.asf"));
   } else if (reader == "amc") {
-    static const Asf skeleton = parse_asf(format_amc(sample_clip()).asf, "good.asf");
-    static_cast<void>(parse_amc(text, skeleton, "fuzzed.amc"));
+    static_cast<void>(parse_amc(text, skeleton(), "fuzzed.amc"));
   } else {
     read_library(text);
   }
@@ -80,6 +84,13 @@ void read(std::string_view text) {
 
 }  // namespace
 }  // namespace kinespace::fuzz
+
+// Before any input is timed.
+extern "C" int LLVMFuzzerInitialize(int* /*count*/, char*** /*arguments*/) {
+  static_cast<void>(kinespace::fuzz::good());
+  static_cast<void>(kinespace::fuzz::skeleton());
+  return 0;
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
