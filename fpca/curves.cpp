@@ -109,7 +109,9 @@ void interpolate(const SideTrack& track, int frame, std::size_t& piece, double* 
 
 // `clip` begins at frame `first` of the track.
 void apply_side_track(const SideTrack& track, int first, Clip& clip) {
-  std::size_t piece = 0;
+  const auto after = std::ranges::upper_bound(track.frames, first);
+  auto piece = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, after - track.frames.begin() - 1));
+  piece = std::min(piece, track.frames.size() - std::min<std::size_t>(2, track.frames.size()));
   double v[4];
   for (int f = 0; f < clip.frames; ++f) {
     interpolate(track, first + f, piece, v);

@@ -57,8 +57,7 @@ struct ClipCurves {
 
 // Side tracks keep to these: 1e-4 cm for translations, 1e-7 for quaternions.
 [[nodiscard]] ClipCurves clip_curves(const Clip& clip);
-// The same of a clip that is needed no more: the memory of a long one goes as its curves come, so that it never takes
-// twice its size.
+// The same of a clip that is needed no more: its rotations, most of a long one, go as its curves come.
 [[nodiscard]] ClipCurves clip_curves(Clip&& clip);
 
 // The way back; quaternions are renormalised. `skeleton` must be that of the clip (or one of the same tree: the motion

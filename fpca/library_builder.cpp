@@ -45,27 +45,18 @@ std::string part_key(const std::string& source_hash, int part) {
   return part == 0 ? source_hash : fmt::format("{} part {}", source_hash, part);
 }
 
-PreparedClip kept_import(const Import& import, const LibraryBuild& build) {
-  const auto part_of = [&](int part) {
-    auto bytes = build.find_import(part_key(import.source_hash, part));
-    if (!bytes) {
-      throw Error(ErrorKind::machine, {.file = import.file.string(),
-                                       .found = "its import is gone",
-                                       .expected = "the partial library to stay",
-                                       .remedy = "build again"});
-    }
-    return *std::move(bytes);
-  };
-  return unpack_prepared(part_of, import.file.string());
+// nullopt when there is none, or when a part of it is gone or damaged.
+std::optional<PreparedClip> kept_import(const Import& import, const LibraryBuild& build) {
+  return unpack_prepared([&](int part) { return build.find_import(part_key(import.source_hash, part)); },
+                         import.file.string());
 }
 
 // Reads a file unless an earlier build did, and keeps what came of it. True when it was there already.
 bool import_file(Import& import, const LibraryBuilderOptions& options, LibraryBuild& build) {
   import.source_hash = source_hash_of(import.file, options.asf);
-  if (build.find_import(import.source_hash)) {
-    const PreparedClip clip = kept_import(import, build);
-    import.tree_hash = clip.skeleton.tree_hash();
-    import.doubts = doubts_about(clip_from_curves(clip.curves, clip.skeleton));
+  if (const auto known = kept_import(import, build)) {
+    import.tree_hash = known->skeleton.tree_hash();
+    import.doubts = doubts_about(clip_from_curves(known->curves, known->skeleton));
     return true;
   }
   Clip read = read_clip(import.file, options.asf);
@@ -119,9 +110,15 @@ std::vector<std::string> doubts_of(const std::vector<Import>& imports) {
 PreparedSource source_of_imports(const std::vector<const Import*>& imports, const LibraryBuild& build) {
   return {static_cast<int>(imports.size()), [&imports, &build](int i) {
             const Import& import = *imports[static_cast<std::size_t>(i)];
-            PreparedClip clip = kept_import(import, build);
-            clip.curves.name = import.name;
-            return clip;
+            std::optional<PreparedClip> clip = kept_import(import, build);
+            if (!clip) {
+              throw Error(ErrorKind::machine, {.file = import.file.string(),
+                                               .found = "its import is gone",
+                                               .expected = "the partial library to stay",
+                                               .remedy = "build again"});
+            }
+            clip->curves.name = import.name;
+            return *std::move(clip);
           }};
 }
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "base/progress.h"
@@ -26,10 +27,12 @@ struct PreparedClip {
 [[nodiscard]] PreparedClip prepare(Clip&& clip, const SequenceOptions& options = {});
 
 // A clip made ready as bytes, in parts of 65 536 frames, so that no long one is held twice. Part 0 has all but the
-// values of the others; `part_of` gives them by number. Throws Error{bad_input} naming `source`.
+// values of the others; `part_of` gives them by number, nullopt for one that is not there: then the clip is not,
+// either. Throws Error{bad_input} naming `source`.
 [[nodiscard]] int prepared_parts(const PreparedClip& clip);
 [[nodiscard]] Bytes pack_prepared(const PreparedClip& clip, int part);
-[[nodiscard]] PreparedClip unpack_prepared(const std::function<Bytes(int part)>& part_of, const std::string& source);
+[[nodiscard]] std::optional<PreparedClip> unpack_prepared(const std::function<std::optional<Bytes>(int part)>& part_of,
+                                                          const std::string& source);
 
 // Clips by number. `load` may be called from several threads.
 struct PreparedSource {

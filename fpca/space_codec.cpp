@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -340,6 +341,10 @@ namespace {
 constexpr int frames_per_part = 65536;
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+int parts_of(int frames) {
+  return (frames - 1) / frames_per_part + 1;
+}
+
 int rows_of_part(int frames, int part) {
   return std::min(frames_per_part, frames - part * frames_per_part);
 }
@@ -378,7 +383,8 @@ void put_head(ByteWriter& out, const PreparedClip& clip) {
   out.put_bytes(tracks);
 }
 
-PreparedClip get_head(ByteReader& in, const std::string& source) {
+// All but the values; room for these is made where they are known to be there.
+PreparedClip get_head(ByteReader& in, const std::string& source, int& frame_count) {
   PreparedClip out;
   out.curves.name = get_short_string(in);
   out.curves.rate_hz = in.get<double>();
@@ -396,17 +402,18 @@ PreparedClip get_head(ByteReader& in, const std::string& source) {
       run.cuts.push_back(static_cast<int>(frame));
     }
     if (cuts == 0) in.fail("a run without frames", "one frame or more");
+    if (!std::ranges::is_sorted(run.cuts, std::less_equal<>{})) in.fail("cuts out of order", "ascending frames");
   }
   out.skeleton = unpack_skeleton(get_part(in, "bytes"), source);
   out.curves.side_tracks = unpack_side_tracks(get_part(in, "bytes"), static_cast<int>(frames), out.skeleton, source);
-  out.curves.values.resize(static_cast<Eigen::Index>(frames), curve_layout(out.skeleton).curve_count());
+  frame_count = static_cast<int>(frames);
   return out;
 }
 
 }  // namespace
 
 int prepared_parts(const PreparedClip& clip) {
-  return (clip.curves.frames() + frames_per_part - 1) / frames_per_part;
+  return parts_of(clip.curves.frames());
 }
 
 Bytes pack_prepared(const PreparedClip& clip, int part) {
@@ -416,14 +423,26 @@ Bytes pack_prepared(const PreparedClip& clip, int part) {
   return one_section("prepared-clip", "clip", std::move(out).take());
 }
 
-PreparedClip unpack_prepared(const std::function<Bytes(int part)>& part_of, const std::string& source) {
+std::optional<PreparedClip> unpack_prepared(const std::function<std::optional<Bytes>(int part)>& part_of,
+                                            const std::string& source) {
   PreparedClip out;
-  for (int part = 0; part == 0 || part < prepared_parts(out); ++part) {
-    const Bytes bytes = part_of(part);
-    const Bitstream stream = Bitstream::parse(bytes, source);
+  int parts = 1;
+  for (int part = 0; part < parts; ++part) {
+    const std::optional<Bytes> bytes = part_of(part);
+    if (!bytes) return std::nullopt;
+    const Bitstream stream = Bitstream::parse(*bytes, source);
     stream.require_kind("prepared-clip");
     ByteReader in(stream.section("clip"), source);
-    if (part == 0) out = get_head(in, source);
+    if (part == 0) {
+      int frames = 0;
+      out = get_head(in, source, frames);
+      const int curves = curve_layout(out.skeleton).curve_count();
+      const auto first_values = static_cast<std::size_t>(rows_of_part(frames, 0)) * static_cast<std::size_t>(curves);
+      if (in.remaining() != first_values * sizeof(float)) in.fail("another number of values", "those of its frames");
+      parts = parts_of(frames);
+      if (parts > 1 && !part_of(parts - 1)) return std::nullopt;
+      out.curves.values.resize(frames, curves);
+    }
     get_rows(in, part, out.curves.values);
   }
   return out;

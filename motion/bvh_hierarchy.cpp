@@ -18,7 +18,8 @@ class HierarchyWords {
  public:
   explicit HierarchyWords(const TextSource& source) : source_(source), at_(source.begin()), end_(source.end()) {
     constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
-    if (std::string_view(at_, source.size()).starts_with(byte_order_mark)) at_ += byte_order_mark.size();
+    if (std::string_view(at_, static_cast<std::size_t>(end_ - at_)).starts_with(byte_order_mark))
+      at_ += byte_order_mark.size();
   }
 
   [[nodiscard]] const char* at() const { return at_; }
@@ -230,6 +231,7 @@ BvhHeader parse_bvh_header(const TextSource& source) {
   header.rate_hz = rate_of(frame_time);
   header.data = words.at();
   while (header.data != source.end() && is_blank(*header.data)) ++header.data;
+  if (header.data == source.end() && source.remaining(header.data) > 0) source.fail_beyond_window();
   if (header.data != source.end() && !is_line_end(*header.data)) {
     source.fail_at_word(header.data, "the end of the line after the frame time");
   }

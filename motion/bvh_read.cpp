@@ -177,20 +177,20 @@ class MotionParser {
   std::vector<TranslationBuilder> translations_;
 };
 
-Clip parse(TextSource& source) {
+}  // namespace
+
+Clip parse_bvh(TextSource& source) {
   return MotionParser(source, parse_bvh_header(source), std::filesystem::path(source.name()).stem().string()).parse();
 }
 
-}  // namespace
-
 Clip parse_bvh(std::string_view text, const std::string& source_name) {
   TextSource source(text, source_name);
-  return parse(source);
+  return parse_bvh(source);
 }
 
 Clip read_bvh(const std::filesystem::path& path) {
   TextSource source(path);
-  return parse(source);
+  return parse_bvh(source);
 }
 
 }  // namespace kinespace

@@ -17,9 +17,6 @@ constexpr char lower(char c) {
   return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
 
-// Of a longer file. More than the part before the numbers takes (motion/bvh_hierarchy.h), which is read as a whole.
-constexpr std::size_t window_bytes = 16 << 20;
-
 }  // namespace
 
 bool same_word(std::string_view a, std::string_view b) {
@@ -43,7 +40,9 @@ double detail::scan_rare_number(const char* first, const char* last) {
       const char* digits = text.data() + mark + 1;
       if (*digits == '+') ++digits;
       const auto parsed = std::from_chars(digits, last, exponent);
-      if (parsed.ec == std::errc::result_out_of_range) exponent = *digits == '-' ? -1'000'000'000 : 1'000'000'000;
+      constexpr long long beyond_all = 1'000'000'000'000;  // more digits than any text has
+      if (parsed.ec == std::errc::result_out_of_range) exponent = *digits == '-' ? -beyond_all : beyond_all;
+      exponent = std::clamp(exponent, -beyond_all, beyond_all);
     }
     const auto places = static_cast<long long>(std::min(point, text.size())) - static_cast<long long>(leading);
     value = exponent + places > 0 ? std::numeric_limits<double>::infinity() : 0;
@@ -84,29 +83,37 @@ void append_exact(std::string& out, double value) {
 
 TextSource::TextSource(std::string_view text, std::string name) : text_(text), name_(std::move(name)) {}
 
-TextSource::TextSource(const std::filesystem::path& path) : name_(path.string()), file_(path) {
+TextSource::TextSource(const std::filesystem::path& path, std::size_t window_bytes)
+    : name_(path.string()), file_(path) {
   window_.resize(std::min(window_bytes, file_->size()));
   text_ = {window_.data(), file_->read(window_)};
+  find_whole_lines();
 }
 
 bool TextSource::more(const char*& at) {
   if (unread() == 0) return false;
-  lines_dropped_ += line_ends_before(at);
-  const auto kept = static_cast<std::size_t>(end() - at);
-  std::memmove(window_.data(), at, kept);
+  const char* keep = at;
+  if (keep == end() && keep != begin() && keep[-1] == '\r') --keep;  // until it is known whether LF follows
+  lines_dropped_ += line_ends_before(keep);
+  const auto kept = static_cast<std::size_t>(end() - keep);
+  const auto offset = at - keep;
+  std::memmove(window_.data(), keep, kept);
   if (kept == window_.size()) window_.resize(std::min(2 * window_.size(), kept + unread()));
   const std::size_t got = file_->read(std::span(window_).subspan(kept));
   text_ = {window_.data(), kept + got};
-  at = begin();
+  at = begin() + offset;
+  find_whole_lines();
   return true;
 }
 
+void TextSource::find_whole_lines() {
+  whole_lines_end_ = end();
+  while (whole_lines_end_ != begin() && !is_line_end(whole_lines_end_[-1])) --whole_lines_end_;
+}
+
 void TextSource::read_line(const char*& at) {
-  do {
-    if (!more(at)) return;
-    whole_lines_end_ = end();
-    while (whole_lines_end_ != at && !is_line_end(whole_lines_end_[-1])) --whole_lines_end_;
-  } while (whole_lines_end_ == at);
+  while (at >= whole_lines_end_ && more(at)) {
+  }
 }
 
 std::int64_t TextSource::line_ends_before(const char* at) const {
@@ -137,11 +144,17 @@ void TextSource::fail_at_word(const char* at, std::string expected, std::string 
   while (at != end() && is_blank(*at)) ++at;
   constexpr std::size_t longest = 60;
   const std::string_view word = word_at(at, end());
+  if (at + word.size() == end() && unread() > 0) fail_beyond_window();  // the rest of it is not in hand
   std::string found = at == end()        ? unread() == 0 ? "the end of the file" : "nothing more in its first 16 MiB"
                       : is_line_end(*at) ? "the end of the line"
                       : word.size() > longest ? "\"" + std::string(word.substr(0, longest)) + "...\""
                                               : "\"" + std::string(word) + "\"";
   fail(at, std::move(found), std::move(expected), std::move(remedy));
+}
+
+void TextSource::fail_beyond_window() const {
+  fail(end(), "more than " + std::to_string(text_.size()) + " bytes before the first frame",
+       "a description of the skeleton", "the file is damaged");
 }
 
 std::string_view word_at(const char* at, const char* end) {

@@ -97,8 +97,8 @@ void append_exact(std::string& out, double value);
 class TextSource {
  public:
   TextSource(std::string_view text, std::string name);
-  // Throws Error as FileReader does.
-  explicit TextSource(const std::filesystem::path& path);
+  // Throws Error as FileReader does. The window grows where a line needs it to.
+  explicit TextSource(const std::filesystem::path& path, std::size_t window_bytes = std::size_t{16} << 20);
   TextSource(const TextSource&) = delete;
   TextSource& operator=(const TextSource&) = delete;
 
@@ -114,7 +114,7 @@ class TextSource {
     if (at >= whole_lines_end_ && unread() > 0) [[unlikely]]
       read_line(at);
   }
-  // When there is more than is in hand: some of it is, and true.
+  // When there is more than is in hand: some of it comes into hand, and true.
   [[nodiscard]] bool more(const char*& at);
 
   // The line of a place, from 1. A line ends at LF, CR LF or CR.
@@ -125,17 +125,20 @@ class TextSource {
                                  std::string remedy = {}) const;
   // The same, quoting the word at that place, or "the end of the line" or "of the file".
   [[noreturn]] void fail_at_word(const char* at, std::string expected, std::string remedy = {}) const;
+  // That what must be in hand as a whole is longer than the window.
+  [[noreturn]] void fail_beyond_window() const;
 
  private:
   [[nodiscard]] std::size_t unread() const { return file_ ? file_->remaining() : 0; }
   [[nodiscard]] std::int64_t line_ends_before(const char* at) const;
+  void find_whole_lines();
   void read_line(const char*& at);
 
   std::string_view text_;
   std::string name_;
   std::optional<FileReader> file_;
   std::vector<char> window_;
-  const char* whole_lines_end_ = nullptr;  // behind the last line end in the window
+  const char* whole_lines_end_ = nullptr;  // behind the last line end in the window; its begin where there is none
   std::int64_t lines_dropped_ = 0;
 };
 

@@ -64,7 +64,7 @@ class LibraryBuild {
 
   [[nodiscard]] const std::filesystem::path& target() const noexcept;
 
-  // How many imports a build before this one left.
+  // How many imports (keys) a build before this one left.
   [[nodiscard]] std::int64_t resumed_imports() const noexcept;
   // Imports: results of work on one source each, by a key that changes with the source's content (its hash). May be
   // called from several threads. nullopt when there is none, or when what is there is damaged.

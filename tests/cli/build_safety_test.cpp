@@ -8,6 +8,7 @@
 
 #include "examples/sample_motions.h"
 #include "motion/read.h"
+#include "storage/sqlite.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 
@@ -43,6 +44,27 @@ TEST_F(BuildSafety, two_joint_trees_in_one_build_name_both_files_and_the_way_out
   EXPECT_FALSE(std::filesystem::exists(library()));
   const CommandResult apart = run_command({"build", clips(), "-o", library(), "--by-skeleton"});
   EXPECT_EQ(apart.code, 0) << apart.err;
+}
+
+// A clip so long that its import is kept in two parts.
+TEST_F(BuildSafety, an_import_that_is_damaged_in_any_part_is_made_again) {
+  const std::string clip = (folder_ / "long.bvh").string();
+  write_text(clip, walking_bvh(70'000, 0.01));
+  ASSERT_EQ(run_command({"build", clip, "-o", library(), "--no-align"}).code, 0);
+  const std::string expected = read_text(library());
+  std::filesystem::remove(library());
+  write_clip(folder_ / "other.bvh", make_walk().clip);  // of another tree: the build fails, what was imported stays
+  const std::string partial = library() + ".partial";
+  for (const char* part : {"%", "% part 1", "%"}) {
+    ASSERT_EQ(run_command({"build", clips(), "-o", library()}).code, 1);
+    ASSERT_TRUE(std::filesystem::exists(partial));
+    sqlite::Database database(partial, sqlite::Mode::read_write, partial);
+    database.execute(std::string("UPDATE imports SET checksum = checksum + 1 WHERE key LIKE '") + part + "'");
+  }
+  std::filesystem::remove(folder_ / "other.bvh");
+  const CommandResult result = run_command({"build", clip, "-o", library(), "--no-align"});
+  EXPECT_EQ(result.code, 0) << result.err;
+  EXPECT_EQ(read_text(library()), expected);
 }
 
 TEST_F(BuildSafety, an_output_that_is_an_input_is_refused) {

@@ -1,9 +1,11 @@
 #include "motion/kinematics.h"
 
+#include <algorithm>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
+#include "motion/position_blocks.h"
 #include "tests/motion/sample_clips.h"
 
 namespace kinespace::test {
@@ -29,6 +31,24 @@ TEST(Kinematics, positions_are_the_product_of_the_transforms_above_for_clips_of_
       for (int j = 0; j < positions.joints; ++j) {
         ASSERT_LT((positions.at(f, j) - world_frame(clip, j, f).position).norm(), 1e-11) << f << " " << j;
       }
+    }
+  }
+}
+
+TEST(Kinematics, blocks_hand_over_every_frame_and_begin_with_what_they_overlap) {
+  for (const int frames : {1, 2, 511, 512, 513, 514, 1025}) {
+    const Clip clip = random_clip(5, frames);
+    const JointPositions whole = joint_positions(clip);
+    for (const int overlap : {0, 2}) {
+      int next = 0;
+      for_each_position_block(clip, overlap, [&](int first, const JointPositions& block) {
+        EXPECT_EQ(first, std::max(0, next - overlap)) << frames;
+        for (int f = 0; f < block.frames; ++f) {
+          for (int j = 0; j < block.joints; ++j) ASSERT_EQ(block.at(f, j), whole.at(first + f, j)) << frames;
+        }
+        next = first + block.frames;
+      });
+      EXPECT_EQ(next, frames);
     }
   }
 }

@@ -73,6 +73,8 @@ TEST(ScanNumber, tells_too_large_from_too_small) {
   EXPECT_EQ(scan("-0.0000001e-400"), 0);
   EXPECT_EQ(scan("1e99999999999999999999"), std::numeric_limits<double>::infinity());
   EXPECT_EQ(scan("1e-99999999999999999999"), 0);
+  EXPECT_EQ(scan("35e9223372036854775807"), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(scan("0.0035e-9223372036854775808"), 0);
   EXPECT_EQ(scan("0e99999999999999999999"), 0);
   std::string long_number(400, '9');
   EXPECT_EQ(scan(long_number), std::numeric_limits<double>::infinity());
