@@ -59,7 +59,7 @@ TEST_F(BuildSafety, an_import_that_is_damaged_in_any_part_is_made_again) {
     ASSERT_EQ(run_command({"build", clips(), "-o", library()}).code, 1);
     ASSERT_TRUE(std::filesystem::exists(partial));
     sqlite::Database database(partial, sqlite::Mode::read_write, partial);
-    database.execute(std::string("UPDATE imports SET checksum = checksum + 1 WHERE key LIKE '") + part + "'");
+    database.prepare("UPDATE imports SET checksum = checksum + 1 WHERE key LIKE ?").bind(1, part).run();
   }
   std::filesystem::remove(folder_ / "other.bvh");
   const CommandResult result = run_command({"build", clip, "-o", library(), "--no-align"});
