@@ -16,6 +16,13 @@ target_link_libraries(kinespace_build_flags INTERFACE fmt::fmt)  # in the shared
 if(KINESPACE_SANITIZE)
   target_compile_options(kinespace_build_flags INTERFACE -fsanitize=${KINESPACE_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(kinespace_build_flags INTERFACE -fsanitize=${KINESPACE_SANITIZE})
+  # As GCC says it to the sources; clang 16 has a way of its own.
+  foreach(kind address thread)
+    string(TOUPPER ${kind} macro)
+    if(KINESPACE_SANITIZE MATCHES ${kind})
+      target_compile_definitions(kinespace_build_flags INTERFACE $<$<CXX_COMPILER_ID:Clang>:__SANITIZE_${macro}__>)
+    endif()
+  endforeach()
 endif()
 
 # Sources are compiled in batches (a third of the time, a third of the disk): names in anonymous namespaces are unique in

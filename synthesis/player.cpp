@@ -114,6 +114,14 @@ KINESPACE_SIMD_BODY void function_values(const PoseJob& job, int component, floa
   }
 }
 
+// Lanes of two vectors in turn, from lane `n` on: one of each, two of each.
+// clang-format off
+#define KINESPACE_IN_TURN(n) \
+  n, n + 16, n + 1, n + 17, n + 2, n + 18, n + 3, n + 19, n + 4, n + 20, n + 5, n + 21, n + 6, n + 22, n + 7, n + 23
+#define KINESPACE_PAIRS_IN_TURN(n) \
+  n, n + 1, n + 16, n + 17, n + 2, n + 3, n + 18, n + 19, n + 4, n + 5, n + 20, n + 21, n + 6, n + 7, n + 22, n + 23
+// clang-format on
+
 // Renormalises the four components (1 / sqrt by Newton's iteration, the same on every processor) and stores them joint
 // by joint.
 KINESPACE_SIMD_BODY void store_rotations(const Vector* q, int count, float* out) {
@@ -125,20 +133,18 @@ KINESPACE_SIMD_BODY void store_rotations(const Vector* q, int count, float* out)
   std::memcpy(&scale, &bits, sizeof(scale));
   for (int i = 0; i < 4; ++i) scale = scale * (1.5F - 0.5F * square * scale * scale);
 
-  const Indices low = {0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23};
-  const Indices high = low + 8;
-  const Indices first = {0, 1, 16, 17, 2, 3, 18, 19, 4, 5, 20, 21, 6, 7, 22, 23};
-  const Indices second = first + 8;
   const Vector w = q[0] * scale;
   const Vector x = q[1] * scale;
   const Vector y = q[2] * scale;
   const Vector z = q[3] * scale;
-  const Vector wx_low = __builtin_shuffle(w, x, low);
-  const Vector wx_high = __builtin_shuffle(w, x, high);
-  const Vector yz_low = __builtin_shuffle(y, z, low);
-  const Vector yz_high = __builtin_shuffle(y, z, high);
-  const Vector rows[4] = {__builtin_shuffle(wx_low, yz_low, first), __builtin_shuffle(wx_low, yz_low, second),
-                          __builtin_shuffle(wx_high, yz_high, first), __builtin_shuffle(wx_high, yz_high, second)};
+  const Vector wx_low = __builtin_shufflevector(w, x, KINESPACE_IN_TURN(0));
+  const Vector wx_high = __builtin_shufflevector(w, x, KINESPACE_IN_TURN(8));
+  const Vector yz_low = __builtin_shufflevector(y, z, KINESPACE_IN_TURN(0));
+  const Vector yz_high = __builtin_shufflevector(y, z, KINESPACE_IN_TURN(8));
+  const Vector rows[4] = {__builtin_shufflevector(wx_low, yz_low, KINESPACE_PAIRS_IN_TURN(0)),
+                          __builtin_shufflevector(wx_low, yz_low, KINESPACE_PAIRS_IN_TURN(8)),
+                          __builtin_shufflevector(wx_high, yz_high, KINESPACE_PAIRS_IN_TURN(0)),
+                          __builtin_shufflevector(wx_high, yz_high, KINESPACE_PAIRS_IN_TURN(8))};
   std::memcpy(out, rows, static_cast<std::size_t>(count) * 4 * sizeof(float));
 }
 
