@@ -36,6 +36,11 @@ void uncounted(void* memory) noexcept {
 void* operator new(std::size_t size) {
   return counted(std::malloc(size == 0 ? 1 : size));
 }
+// Replaced as well: a sanitizer has one of its own, which the delete below would not fit.
+void* operator new(std::size_t size, const std::nothrow_t& /*tag*/) noexcept {
+  void* const memory = std::malloc(size == 0 ? 1 : size);
+  return memory == nullptr ? nullptr : counted(memory);
+}
 void* operator new(std::size_t size, std::align_val_t alignment) {
   const auto step = static_cast<std::size_t>(alignment);
   return counted(std::aligned_alloc(step, (size + step - 1) / step * step));
