@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "bench/scratch_folder.h"
+
 #include "fpca/library_view.h"
 
 namespace kinespace {
@@ -15,16 +17,13 @@ class BenchLibrary {
   // Of the motion files in `folders`; with `every` > 0, every so many-th file is held out. Throws Error{bad_input} when
   // a folder is missing.
   explicit BenchLibrary(const std::vector<std::filesystem::path>& folders, int every = 0);
-  ~BenchLibrary();
-  BenchLibrary(const BenchLibrary&) = delete;
-  BenchLibrary& operator=(const BenchLibrary&) = delete;
 
   [[nodiscard]] LibraryView& view() { return *view_; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] const std::vector<std::filesystem::path>& held_out() const { return held_out_; }
 
  private:
-  std::filesystem::path folder_;
+  ScratchFolder folder_;  // outlives the view
   std::filesystem::path path_;
   std::vector<std::filesystem::path> held_out_;
   std::unique_ptr<LibraryView> view_;

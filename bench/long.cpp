@@ -3,17 +3,16 @@
 // program, as a user would start it. A million frames take a quarter of an hour in all.
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
 #include "bench/report.h"
+#include "bench/scratch_folder.h"
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -28,28 +27,6 @@ namespace kinespace {
 namespace {
 
 constexpr std::array frame_counts = {10'000, 100'000, 1'000'000};
-
-// A folder that goes with its owner.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "kinespace-bench-XXXXXX").string();
-    if (::mkdtemp(name.data()) == nullptr) {
-      throw Error(ErrorKind::machine, {.file = name, .found = "cannot make a folder", .remedy = "free some space"});
-    }
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 // The clip forth and back, for so many frames: nothing jumps.
 Clip for_frames(const Clip& clip, int frames) {
@@ -106,14 +83,14 @@ Taken run(const std::vector<std::string>& arguments) {
 // What is measured: a name, and the words of the command line for a clip.
 std::vector<std::pair<std::string, std::vector<std::string>>> command_lines(const ScratchFolder& folder,
                                                                             const std::string& clip) {
-  const std::string library = folder.file("one.kspace");
+  const std::string library = folder.file("one.kspace").string();
   return {{"info", {"info", clip}},
           {"info --repeats", {"info", "--repeats", clip}},
           {"query", {"query", library, clip}},
-          {"build", {"build", clip, "-o", folder.file("long.kspace")}},
-          {"clean", {"clean", clip, "-o", folder.file("clean.bvh")}},
-          {"encode, motion-space", {"encode", clip, "-o", folder.file("a.ksm")}},
-          {"encode, rma", {"encode", clip, "--codec", "rma", "-o", folder.file("b.ksm")}}};
+          {"build", {"build", clip, "-o", folder.file("long.kspace").string()}},
+          {"clean", {"clean", clip, "-o", folder.file("clean.bvh").string()}},
+          {"encode, motion-space", {"encode", clip, "-o", folder.file("a.ksm").string()}},
+          {"encode, rma", {"encode", clip, "--codec", "rma", "-o", folder.file("b.ksm").string()}}};
 }
 
 void add_results(const std::string& name, int frames, const Taken* tenth, const Taken& now, const Clip& clip,
@@ -157,14 +134,14 @@ std::filesystem::path find_clip(const std::filesystem::path& folder, std::string
 BenchReport bench_long(const BenchOptions& options) {
   const Clip clip = read_clip(find_clip(options.data / "bandai1", "walk"));
   const ScratchFolder folder;
-  const std::string short_clip = folder.file("one.bvh");
+  const std::string short_clip = folder.file("one.bvh").string();
   write_bvh(short_clip, clip);
-  static_cast<void>(run({"build", short_clip, "-o", folder.file("one.kspace")}));
+  static_cast<void>(run({"build", short_clip, "-o", folder.file("one.kspace").string()}));
   BenchReport report{
       .bench = "long", .device = "cpu", .threads = static_cast<int>(std::thread::hardware_concurrency())};
   std::vector<Taken> before;
   for (const int frames : frame_counts) {
-    const std::string path = folder.file("long.bvh");
+    const std::string path = folder.file("long.bvh").string();
     write_bvh(path, for_frames(clip, frames));
     std::vector<Taken> now;
     for (const auto& [name, words] : command_lines(folder, path)) {

@@ -105,31 +105,26 @@ LegTracks::LegTracks(const Clip& clip, const Feet& feet)
 }
 
 void LegTracks::put_back(Clip& clip) const {
-  for (std::size_t i = 0; i < joints_.size(); ++i) {
-    std::ranges::copy(rotations_[i], clip.rotation_track(joints_[i]).begin());
-  }
-  if (root_.empty()) {
-    std::erase_if(clip.translations, [&](const auto& track) { return track.joint == root_joint_; });
-  } else {
-    clip.require_translation_track(root_joint_).values = root_;
-  }
+  write(clip, 0);
 }
 
 Clip LegTracks::slice_before(const Clip& now, int first, int count) const {
   Clip out = slice(now, first, count);
-  const LegTracks part = sliced(first, count);
-  part.put_back(out);
+  write(out, first);
   return out;
 }
 
-LegTracks LegTracks::sliced(int first, int count) const {
-  LegTracks out = LegTracks(joints_, root_joint_);
+void LegTracks::write(Clip& clip, int first) const {
   for (std::size_t i = 0; i < joints_.size(); ++i) {
-    const auto from = rotations_[i].begin() + 4 * static_cast<std::ptrdiff_t>(first);
-    out.rotations_[i].assign(from, from + 4 * static_cast<std::ptrdiff_t>(count));
+    const auto track = clip.rotation_track(joints_[i]);
+    std::copy_n(rotations_[i].begin() + 4 * static_cast<std::ptrdiff_t>(first), track.size(), track.begin());
   }
-  if (!root_.empty()) out.root_.assign(root_.begin() + first, root_.begin() + first + count);
-  return out;
+  if (root_.empty()) {
+    std::erase_if(clip.translations, [&](const auto& track) { return track.joint == root_joint_; });
+  } else {
+    auto& values = clip.require_translation_track(root_joint_).values;
+    std::copy_n(root_.begin() + first, values.size(), values.begin());
+  }
 }
 
 }  // namespace kinespace

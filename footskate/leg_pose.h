@@ -37,8 +37,8 @@ class LegTracks {
   [[nodiscard]] Clip slice_before(const Clip& now, int first, int count) const;
 
  private:
-  LegTracks(const std::array<int, 6>& joints, int root_joint) : joints_(joints), root_joint_(root_joint) {}
-  [[nodiscard]] LegTracks sliced(int first, int count) const;
+  // From frame `first` on, as many frames as `clip` has.
+  void write(Clip& clip, int first) const;
 
   std::array<int, 6> joints_;
   int root_joint_;

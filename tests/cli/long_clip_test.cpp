@@ -1,5 +1,7 @@
 // What a recording of a hundred thousand frames takes: memory in proportion to its numbers, at most a few hundred
 // megabytes. `kinespace bench long` measures the rest, up to a million.
+#include "tests/support/long_clip.h"
+
 #include <gtest/gtest.h>
 
 #include "examples/sample_motions.h"
@@ -10,22 +12,6 @@
 namespace kinespace::test {
 namespace {
 
-// A sample motion over and over.
-Clip repeated_sample(int frames) {
-  const Clip once = make_walk().clip;
-  Clip out = make_clip("long", once.skeleton, once.rate_hz, frames);
-  for (int j = 0; j < once.skeleton.joint_count(); ++j) {
-    for (int f = 0; f < frames; ++f) out.set_rotation(j, f, once.rotation(j, f % once.frames));
-  }
-  for (const auto& track : once.translations) {
-    auto& values = out.require_translation_track(track.joint).values;
-    for (int f = 0; f < frames; ++f) {
-      values[static_cast<std::size_t>(f)] = track.values[static_cast<std::size_t>(f % once.frames)];
-    }
-  }
-  return out;
-}
-
 TEST(LongClip, a_hundred_thousand_frames_take_at_most_400_megabytes) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
   constexpr double most_megabytes = 4000;  // a sanitizer takes its own
@@ -35,7 +21,7 @@ TEST(LongClip, a_hundred_thousand_frames_take_at_most_400_megabytes) {
   const TemporaryFolder folder;
   const auto path = [&](const char* name) { return (folder / name).string(); };
   write_bvh(folder / "one.bvh", make_walk().clip);
-  write_bvh(folder / "long.bvh", repeated_sample(100'000));
+  write_bvh(folder / "long.bvh", over_and_over(make_walk().clip, 100'000));
   ASSERT_EQ(run_command({"build", path("one.bvh"), "-o", path("one.kspace")}).code, 0);
   const std::vector<std::vector<std::string>> lines = {
       {"info", path("long.bvh")},

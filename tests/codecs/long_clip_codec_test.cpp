@@ -10,24 +10,15 @@
 #include "codecs/rma/markers.h"
 #include "examples/sample_motions.h"
 #include "tests/support/allocation_meter.h"
+#include "tests/support/long_clip.h"
 
 namespace kinespace {
 namespace {
 
 constexpr int half_frames = 40'000;
 
-// A motion over and over.
 Clip repeated_motion(int frames) {
-  const Clip once = sample_library({.takes = 1}).front().clip;
-  Clip out = make_clip("long", once.skeleton, once.rate_hz, frames);
-  for (int f = 0; f < frames; ++f) {
-    for (int j = 0; j < once.skeleton.joint_count(); ++j) out.set_rotation(j, f, once.rotation(j, f % once.frames));
-    for (const auto& track : once.translations) {
-      out.require_translation_track(track.joint).values[static_cast<std::size_t>(f)] =
-          track.values[static_cast<std::size_t>(f % once.frames)];
-    }
-  }
-  return out;
+  return test::over_and_over(sample_library({.takes = 1}).front().clip, frames);
 }
 
 std::size_t bytes_of(const Clip& clip) {

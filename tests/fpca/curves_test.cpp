@@ -14,6 +14,7 @@
 #include "fpca/uniform_spline.h"
 #include "motion/error_measures.h"
 #include "tests/fpca/sample_space.h"
+#include "tests/support/long_clip.h"
 
 namespace kinespace {
 namespace {
@@ -56,19 +57,7 @@ TEST(Curves, the_way_there_and_back_keeps_every_joint) {
 
 // Long enough that curves are made in several blocks of frames.
 Clip long_clip() {
-  const Clip& once = test::sample_clips().front();
-  const int frames = 150'000;
-  Clip out = make_clip("long", once.skeleton, once.rate_hz, frames);
-  for (int j = 0; j < once.skeleton.joint_count(); ++j) {
-    for (int f = 0; f < frames; ++f) out.set_rotation(j, f, once.rotation(j, f % once.frames));
-  }
-  for (const auto& track : once.translations) {
-    auto& values = out.require_translation_track(track.joint).values;
-    for (int f = 0; f < frames; ++f) {
-      values[static_cast<std::size_t>(f)] = track.values[static_cast<std::size_t>(f % once.frames)];
-    }
-  }
-  return out;
+  return test::over_and_over(test::sample_clips().front(), 150'000);
 }
 
 TEST(Curves, a_clip_that_gives_up_its_memory_has_the_same_curves) {
