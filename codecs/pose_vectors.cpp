@@ -279,28 +279,6 @@ PoseVectors pose_vectors(const Clip& clip, const ReferencePose& reference) {
   return out;
 }
 
-void apply_side_track(const SideTrack& track, int first, Clip& clip) {
-  const auto d = static_cast<std::size_t>(track.dimensions);
-  // The knot before `first`, but for the last one.
-  const auto later = std::ranges::upper_bound(track.frames.begin() + 1, track.frames.end(), first);
-  auto piece = static_cast<std::size_t>(later - track.frames.begin()) - 1;
-  if (piece > 0 && piece + 1 == track.frames.size()) --piece;
-  std::array<double, 4> v{};
-  for (int f = 0; f < clip.frames; ++f) {
-    const int frame = first + f;
-    while (piece + 2 < track.frames.size() && track.frames[piece + 1] <= frame) ++piece;
-    const std::size_t next = std::min(piece + 1, track.frames.size() - 1);
-    const double span = std::max(1, track.frames[next] - track.frames[piece]);
-    const double b = (frame - track.frames[piece]) / span;
-    for (std::size_t k = 0; k < d; ++k) v[k] = (1 - b) * track.values[piece * d + k] + b * track.values[next * d + k];
-    if (d == 3) {
-      clip.require_translation_track(track.joint).values[static_cast<std::size_t>(f)] = {v[0], v[1], v[2]};
-    } else {
-      clip.set_rotation(track.joint, f, Eigen::Quaterniond(v[0], v[1], v[2], v[3]).normalized());
-    }
-  }
-}
-
 PoseWriter::PoseWriter(const ReferencePose& reference, const CoarsePlacement& placement, Clip& clip)
     : start_(placement.start_cm()), turn_(placement.turn()), clip_(clip), joints_(clip.skeleton.rotating_joints()) {
   for (int j = 0; j < reference.joint_count(); ++j) reference_.push_back(reference.orientation(j));

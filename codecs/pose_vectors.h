@@ -70,9 +70,6 @@ struct PoseVectors {
 // clip when a value is not finite or a position lies farther than 1e7 cm away.
 [[nodiscard]] PoseVectors pose_vectors(const Clip& clip, const ReferencePose& reference);
 
-// Puts a side track onto a clip that holds the frames from `first` on of the clip that it was made for.
-void apply_side_track(const SideTrack& track, int first, Clip& clip);
-
 // Writes frames [first, first + count) of a clip from the vectors of these frames, [dimension][count]: local rotations
 // and the travel of the root. Side tracks must have been applied to the clip before. Same bits on every machine.
 class PoseWriter {

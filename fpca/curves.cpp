@@ -107,7 +107,19 @@ void interpolate(const SideTrack& track, int frame, std::size_t& piece, double* 
   }
 }
 
-// `clip` begins at frame `first` of the track.
+// Columns [at, at + 4) hold unit quaternions: takes out the sign flips from frame to frame.
+void make_continuous(SampleMatrix& values, Eigen::Index at) {
+  for (Eigen::Index f = 1; f < values.rows(); ++f) {
+    if (values.row(f).segment<4>(at).dot(values.row(f - 1).segment<4>(at)) < 0) values.row(f).segment<4>(at) *= -1;
+  }
+}
+
+}  // namespace
+
+CurveLayout curve_layout(const Skeleton& skeleton) {
+  return {skeleton.rotating_joints()};
+}
+
 void apply_side_track(const SideTrack& track, int first, Clip& clip) {
   const auto after = std::ranges::upper_bound(track.frames, first);
   auto piece = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, after - track.frames.begin() - 1));
@@ -121,19 +133,6 @@ void apply_side_track(const SideTrack& track, int first, Clip& clip) {
       clip.set_rotation(track.joint, f, Eigen::Quaterniond(v[0], v[1], v[2], v[3]).normalized());
     }
   }
-}
-
-// Columns [at, at + 4) hold unit quaternions: takes out the sign flips from frame to frame.
-void make_continuous(SampleMatrix& values, Eigen::Index at) {
-  for (Eigen::Index f = 1; f < values.rows(); ++f) {
-    if (values.row(f).segment<4>(at).dot(values.row(f - 1).segment<4>(at)) < 0) values.row(f).segment<4>(at) *= -1;
-  }
-}
-
-}  // namespace
-
-CurveLayout curve_layout(const Skeleton& skeleton) {
-  return {skeleton.rotating_joints()};
 }
 
 double heading_of(const Eigen::Quaterniond& q) {

@@ -67,6 +67,9 @@ struct ClipCurves {
 [[nodiscard]] Clip clip_of_frames(const ClipCurves& curves, const Eigen::Ref<const SampleMatrix>& rows, int first,
                                   const Skeleton& skeleton);
 
+// Puts a side track onto a clip that holds the frames from `first` on of the clip that it was made for.
+void apply_side_track(const SideTrack& track, int first, Clip& clip);
+
 // The heading of an orientation: the angle of its twist about +Y (swing-twist), in (-pi, pi]; 0 where it has none.
 [[nodiscard]] double heading_of(const Eigen::Quaterniond& q);
 
