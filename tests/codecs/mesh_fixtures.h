@@ -1,10 +1,10 @@
 // The streams in fixtures/, which every build decodes to the same bits: what they were made of, and how.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "codecs/mesh/mesh_codec.h"
 #include "tests/mesh/sample_meshes.h"
@@ -26,10 +26,14 @@ inline MeshSequence mesh_fixture_sample() {
   return joined(bending_tube(400, 12, 1.2), sheet(12, 9, 12));
 }
 
-inline std::array<MeshFixture, 4> mesh_fixtures() {
+inline std::vector<MeshFixture> mesh_fixtures() {
   return {MeshFixture{"mesh_standard", "mesh-harmonics", {.kg = 0.5, .bases = 80}, 0xe8e14a0f9cbeda61},
           MeshFixture{
               "mesh_coarse", "mesh-harmonics", {.kg = 2.5, .bases = 60, .coarse_vertices = 250}, 0x2aa24f2aa84f318a},
+          MeshFixture{"mesh_paper",
+                      "mesh-harmonics",
+                      {.kg = 2.5, .profile = MeshProfile::paper, .bases = 60, .clusters = 2},
+                      0x1a3ce614a12c541e},
           MeshFixture{"mesh_pca", "mesh-pca", {.kg = 0.5}, 0x459893ff4e3d0c7a},
           MeshFixture{"mesh_draco", "mesh-draco", {.kg = 2}, 0x508e67410df36294}};
 }
