@@ -1,5 +1,5 @@
-// How well the motion space holds real motion - joint error by level of detail, jumps at cuts, and
-// what alignment is worth. Part of `kinespace bench fpca`.
+// How well the motion space holds real motion - joint error by level of detail, jumps at cuts, and what alignment is
+// worth. Part of `kinespace bench fpca`.
 #include "bench/space.h"
 
 #include <algorithm>

@@ -1,10 +1,11 @@
 // A clip as curves that a linear codec can take apart, and back: one vector of numbers a frame,
 //
-//   0 1 2      position of the travel root in cm
-//   3          heading in radians: the root's turn about the vertical, unwrapped, smooth where the root hangs upside
-//   down 4 + 3 j .. the turn of rotating joint j from its reference orientation, as 4 tan(angle / 4) times the axis
-//              (modified Rodrigues parameters: a rotation vector near zero, and back to a quaternion without sine,
-//              cosine or root); the root's without its heading
+//   0 1 2       position of the travel root in cm
+//   3           heading in radians: the root's turn about the vertical, unwrapped, smooth where the root hangs upside
+//               down
+//   4 + 3 j ..  the turn of rotating joint j from its reference orientation, as 4 tan(angle / 4) times the axis
+//               (modified Rodrigues parameters: a rotation vector near zero, and back to a quaternion without sine,
+//               cosine or root); the root's without its heading
 //
 // in the clip's own frame: turned about the vertical and moved by a coarse Placement (steps of 1/128 turn, 8 cm), so
 // that clips that walk off in different directions look alike. What the vectors do not carry (joints above the travel

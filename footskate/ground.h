@@ -56,8 +56,8 @@ struct Rest {
 // held still in the air never bears the body.
 [[nodiscard]] std::vector<Rest> bearing_rests(const FootTracks& tracks, const Ground& ground);
 
-// The height of each slot over the ground while its foot stands flat, cm: the median over rests
-// whose toe is on the ground; 0 for toes, and for ankles of feet without them.
+// The height of each slot over the ground while its foot stands flat, cm: the median over rests whose toe is on the
+// ground; 0 for toes, and for ankles of feet without them.
 [[nodiscard]] std::array<double, 4> standing_heights(const FootTracks& tracks, const Ground& ground);
 
 [[nodiscard]] Ground estimate_ground(const FootTracks& tracks);

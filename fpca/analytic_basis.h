@@ -15,8 +15,7 @@ namespace kinespace {
 
 enum class AnalyticFamily : std::uint8_t {
   // 1, sin 2 pi u, cos 2 pi u, sin 4 pi u, ... with the domain as period. T points with both ends carry T - 1 of them
-  // (the
-  // ends are one point of the circle); the last function of a complete basis is the difference of the ends.
+  // (the ends are one point of the circle); the last function of a complete basis is the difference of the ends.
   fourier,
   // Polynomials of degree 0, 1, 2, ...: Legendre's, made orthonormal on the grid (Gram polynomials).
   legendre,

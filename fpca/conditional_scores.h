@@ -1,5 +1,7 @@
 // Scores by conditional expectation (PACE; Yao, Mueller, Wang 2005, eq. 4): with y = mu + Phi xi + noise, xi normal,
+//
 //   E[xi | y] = Lambda Phi' (Phi Lambda Phi' + s I)^-1 (y - mu),
+//
 // which on a common grid is one matrix for all curves. Pushed through, it is Lambda^1/2 (G + s I)^-1 Lambda^1/2 Phi'
 // with G = Lambda^1/2 Phi' Phi Lambda^1/2: as small as the number of functions, symmetric, and the posterior covariance
 // s Lambda^1/2 (G + s I)^-1 Lambda^1/2 needs no difference. Private to this folder.

@@ -1,10 +1,15 @@
 // Count, mean and scatter of curves: what a principal component analysis needs of them, and all that has to travel
 // between threads, machines or runs.
 //
-// A curve is T numbers, one for each point of a grid. With n curves y_i and mean m the scatter is sum (y_i - m)(y_i -
-// m)'. Blocks are centred on their own means before they are multiplied, and joined by Chan's rule (Chan, Golub,
-// LeVeque 1983)
+// A curve is T numbers, one for each point of a grid. With n curves y_i and mean m the scatter is
+//
+//   S = sum (y_i - m)(y_i - m)'
+//
+// Blocks are centred on their own means before they are multiplied, and joined by Chan's rule (Chan, Golub, LeVeque
+// 1983)
+//
 //   S = S_a + S_b + n_a n_b / (n_a + n_b) (m_b - m_a)(m_b - m_a)',
+//
 // so a mean far from zero costs no digits, and moments of two halves merged equal those of all curves up to rounding.
 #pragma once
 

@@ -5,18 +5,23 @@
 // section 4.1; Yao, Mueller, Wang 2005 for the smoothed covariance, the noise variance and the conditional scores).
 //
 // Integrals are trapezoid sums with weights w (h inside, h / 2 at the ends; a grid of one point has weight 1).
-// `consistent`, the default: phi = W^-1/2 v for eigenvectors v of W^1/2 C W^1/2. The functions are orthonormal in the
-// inner
-//   product that the integration scores use, so scores and reconstruction are exact inverses on their span, and
-//   Parseval holds: the squared L2 error of leaving functions out is the sum of their squared scores.
-// `pace`: what the PACE package computes (fdapace 0.6), for comparison: v of plain C, lambda = h d, phi = v /
-// sqrt(trapz v^2).
-//   Its functions are orthogonal in the plain dot product but scored in the trapezoid one.
 //
-// Signs. consistent: the integral of phi(u) exp(-u), u in [0, 1], is positive (a weight that no sine or cosine of a
-// whole number of half-periods is orthogonal to); pace: sum_j phi(t_j) mu(t_j) >= 0, mu interpolated linearly to the
-// work grid, and the consistent rule where that sum is 0. The result is the same for the same curves whatever the
-// number of threads.
+//   consistent  the default: phi = W^-1/2 v for eigenvectors v of W^1/2 C W^1/2. The functions are orthonormal in the
+//               inner product that the integration scores use, so scores and reconstruction are exact inverses on their
+//               span, and Parseval holds: the squared L2 error of leaving functions out is the sum of their squared
+//               scores.
+//   pace        what the PACE package computes (fdapace 0.6), for comparison: v of plain C, lambda = h d,
+//               phi = v / sqrt(trapz v^2). Its functions are orthogonal in the plain dot product but scored in the
+//               trapezoid one.
+//
+// Signs:
+//
+//   consistent  the integral of phi(u) exp(-u), u in [0, 1], is positive (a weight that no sine or cosine of a whole
+//               number of half-periods is orthogonal to).
+//   pace        sum_j phi(t_j) mu(t_j) >= 0, mu interpolated linearly to the work grid, and the consistent rule where
+//               that sum is 0.
+//
+// The result is the same for the same curves whatever the number of threads.
 #pragma once
 
 #include <cstdint>

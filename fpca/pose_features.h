@@ -1,8 +1,8 @@
 // What a keyframe is compared by: the features whose Euclidean distance is the keyframe distance of yoo2019, eq. 12 and
 // 13 (after lee 2010, "Motion fields").
 //
-//   d^2 = b_root |v - v'|^2 + b_0 |q_0(u) - q_0'(u)|^2 + sum_i b_i |p_i(u) - p_i'(u)|^2 + sum_i b_i |(q_i p_i)(u) -
-//   (q_i' p_i')(u)|^2
+//   d^2 = b_root |v - v'|^2 + b_0 |q_0(u) - q_0'(u)|^2
+//         + sum_i b_i |p_i(u) - p_i'(u)|^2 + sum_i b_i |(q_i p_i)(u) - (q_i' p_i')(u)|^2
 //
 // p_i is a joint's local orientation, q_i its rotation from this keyframe to the next, so (q_i p_i)(u) = p_i of the
 // next keyframe applied to u; v the root's step in metres to the next keyframe, in the clip's heading 0 frame; u a

@@ -17,16 +17,19 @@
 namespace kinespace {
 namespace {
 
-// Where "auto" leaves the processor: floating-point operations of one call. `processor`: OpenCL devices that are
-// processors, measured with PoCL 3.1 on two AVX-512 cores (GFLOP/s here and there; `kinespace bench kernels` prints
-// them on any machine):
+// Where "auto" leaves the processor: floating-point operations of one call. Infinity: never.
+//
+// `processor`: OpenCL devices that are processors, measured with PoCL 3.1 on two AVX-512 cores (GFLOP/s here and there;
+// `kinespace bench kernels` prints them on any machine):
+//
 //   keyframe_distances   94,  76   1000 x 1000 rows of 128: BLAS wins at every size
 //   dtw                  49, 165   all pairs of 200 clips: wins from 16 pairs a query on, but the first call costs 0.1
 //                                  to 0.2 s for opening the device and its program
 //   covariance          125,  43   1 000 000 curves of 128 points: BLAS wins at every size
 //   projection           64,  24   100 000 curves of 128 points, 20 functions: BLAS wins at every size
 //   local_linear         34,  46   200 x 200 points, which take 2 ms: nothing to win
-// `gpu`: the others; estimates, from data that cross a bus at 10 GB/s. Infinity: never.
+//
+// `gpu`: the others; estimates, from data that cross a bus at 10 GB/s.
 struct Threshold {
   KernelFamily family;
   double processor;

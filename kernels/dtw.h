@@ -7,11 +7,12 @@
 // is the squared distance.
 //
 // Step patterns (sakoe 1978):
+//
 //   symmetric      from (i-1, j-1), (i, j-1) or (i-1, j)
 //   slope_limited  P = 1: a straight step only after a diagonal one, so that slopes lie in [1/2, 2]; the first cell
-//   counts
-//                  as reached diagonally. There is a legal path exactly when neither clip is longer than twice the
-//                  other.
+//                  counts as reached diagonally. There is a legal path exactly when neither clip is longer than twice
+//                  the other.
+//
 // Equal predecessors: the diagonal one is taken, then (i, j-1), then (i-1, j).
 //
 // Band: cells with |i (m-1) - j (n-1)| <= max(f (n-1)(m-1), n-1, m-1), that is a slanted band around the diagonal whose

@@ -1,9 +1,12 @@
 // The product of two matrices in tiles, for kernels that differ in where the factors come from and what becomes of the
 // sums. Who includes this defines the type Operands and
-//   float a_value(Operands o, int i, int k)     row i of the first factor; i within the matrix
-//   float4 a_values(Operands o, int i, int k)   rows i .. i + 3, where A_ROWS_APART is 0: rows lie side by side in
-//   memory float b_value(Operands o, int k, int j)     column j of the second; j up to the next multiple of
-//   TILE_COLUMNS float16 b_values(Operands o, int k, int j)  columns j .. j + 15
+//
+//   float a_value(Operands o, int i, int k)      row i of the first factor; i within the matrix
+//   float4 a_values(Operands o, int i, int k)    rows i .. i + 3, where A_ROWS_APART is 0: rows lie side by side in
+//                                                memory
+//   float b_value(Operands o, int k, int j)      column j of the second; j up to the next multiple of TILE_COLUMNS
+//   float16 b_values(Operands o, int k, int j)   columns j .. j + 15
+//
 // Build option: WITH_LANES 1 for processors (one item a group; a tile of sums in float16 registers), 0 for GPUs (256
 // items a group, 4 x 4 sums each, factors staged in local memory).
 

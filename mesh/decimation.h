@@ -6,7 +6,9 @@
 // Back: in a key-frame that both sides know, a removed vertex p lies over the coarse triangle nearest to it, with
 // barycentric weights w_k of the nearest point and coarse corners a_k. In another frame, with corners b_k and the
 // rotations R_k of the coarse 1-rings,
-//     p' = sum over k of w_k (b_k + R_k (p - a_k))
+//
+//   p' = sum over k of w_k (b_k + R_k (p - a_k))
+//
 // Vertices that stay come back exactly, and a rigid motion is followed exactly.
 #pragma once
 

@@ -4,9 +4,8 @@
 // what was done to k_low is done to k:
 //
 //   poisson    deformation transfer (sumner and popovic 2004; chen2019 section 3.3): each triangle's deformation
-//   gradient
-//              S_t from k_low to x_low, then the mesh whose gradients from k come closest to the S_t, weighted by area
-//              (botsch 2006 shows that to be sumner's system): one sparse factorisation for the key-frame, one
+//              gradient S_t from k_low to x_low, then the mesh whose gradients from k come closest to the S_t, weighted
+//              by area (botsch 2006 shows that to be sumner's system): one sparse factorisation for the key-frame, one
 //              substitution for a frame. Each connected component is placed so that its centroid is that of x_low,
 //              which is the true one when U holds the constants. Where a triangle of k_low degenerates (fingers,
 //              hooves) its gradient means nothing: it gives way to the rotation of its vertices' surroundings.
@@ -15,7 +14,9 @@
 //
 // Either is exact for a rigid motion, to 1e-8 of the size. Both leave a low-frequency error, which costs no bits to
 // remove:
-//     x <- x + U (c - U^+ x)       (correct_low_frequencies)
+//
+//   x <- x + U (c - U^+ x)       (correct_low_frequencies)
+//
 // The result is the same to the last bit on every machine, for the same inputs.
 #pragma once
 

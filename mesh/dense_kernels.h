@@ -2,8 +2,7 @@
 //
 // A library's product adds up in an order that depends on the processor's vectors and caches. Here the order is written
 // down: what is summed comes in blocks of fixed size, within a block one after the other; vectors run along independent
-// results.
-// All matrices are stored by rows; `stride` is the distance of rows in numbers.
+// results. All matrices are stored by rows; `stride` is the distance of rows in numbers.
 #pragma once
 
 #include <cstddef>

@@ -4,8 +4,8 @@
 //   kg_time  the same with E(A) the mean over time of each vertex; large for a sequence that hardly moves, and NaN for
 //            one that stands still (0 when B is A as well)
 //   lr       local rigidity (chen2019 eq. 10 and 11): mean over frames of
-//                alpha * sum over vertices i of min over rotations R of sum over j in N(i) of w_ij |R (a_i - a_j) -
-//                (b_i - b_j)|^2
+//                alpha * sum over vertices i of min over rotations R of
+//                    sum over j in N(i) of w_ij |R (a_i - a_j) - (b_i - b_j)|^2
 //            N(i): the 1-ring by the triangles (the paper's radius epsilon is not given), w_ij = 1 / (|N(i)| + |N(j)|),
 //            alpha = 1e4 / diagonal^2, the diagonal of the box around all frames of A. Zero when every 1-ring of every
 //            frame of B is a rigidly moved one of A. Rotations only: a mirrored neighbourhood is an error.

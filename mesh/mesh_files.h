@@ -1,12 +1,10 @@
 // Mesh sequences in and out.
 //
 //   NumPy  a folder with positions.npy ([frames][vertices][3], or [vertices][3] for one frame; float32 or float64,
-//   which is
-//          rounded to float32) and triangles.npy ([triangles][3]; int32, int64, uint32 or uint64); or that positions
-//          file, whatever its name, with triangles.npy beside it. Little-endian, in C order.
+//          which is rounded to float32) and triangles.npy ([triangles][3]; int32, int64, uint32 or uint64); or that
+//          positions file, whatever its name, with triangles.npy beside it. Little-endian, in C order.
 //   OBJ    a folder with a file for each frame, in the natural order of their names (f2 before f10), or one file. `v`
-//   and
-//          `f` are read, polygons are cut into fans; the rest is ignored.
+//          and `f` are read, polygons are cut into fans; the rest is ignored.
 //   PLY    the same, binary of either byte order: vertices with x, y, z; faces with vertex_indices or vertex_index.
 //   glTF   .gltf or .glb, baked: nodes, skins and morph targets of the first animation (or the rest pose, one frame)
 //          for every node with triangles in the file, at `rate_hz`; where all samplers share evenly spaced times, at

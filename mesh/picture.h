@@ -1,9 +1,9 @@
 // Pictures of meshes, without a display.
 //
-// A mesh is drawn in parallel projection with smooth shading, grey, or coloured by a number at each vertex
-// from blue (0) over white to red (`worst` and above), as figures 6 and 9 of chen2019 colour errors. Seen from the
-// front: x to the right, y up, z towards the viewer; `turn_degrees` turns the mesh about the vertical first. Both sides
-// of a triangle are lit. One set of inputs gives one picture on one machine.
+// A mesh is drawn in parallel projection with smooth shading, grey, or coloured by a number at each vertex from blue
+// (0) over white to red (`worst` and above), as figures 6 and 9 of chen2019 colour errors. Seen from the front: x to
+// the right, y up, z towards the viewer; `turn_degrees` turns the mesh about the vertical first. Both sides of a
+// triangle are lit. One set of inputs gives one picture on one machine.
 #pragma once
 
 #include <cstdint>

@@ -50,9 +50,9 @@ struct Clusters {
 // vertices: 250 frames of 10 000 vertices take under a second.
 [[nodiscard]] Eigen::MatrixXd frame_distances(const MeshSequence& mesh);
 
-// Clusters by frame_distances. Medoids and members are found in turns
-// (voronoi iteration) from a greedy start and from `starts` random ones; the cheapest result wins, the first of equal
-// ones. The same options give the same result everywhere.
+// Clusters by frame_distances. Medoids and members are found in turns (voronoi iteration) from a greedy start and from
+// `starts` random ones; the cheapest result wins, the first of equal ones. The same options give the same result
+// everywhere.
 [[nodiscard]] Clusters cluster_frames(const MeshSequence& mesh, const ClusterOptions& options);
 
 // The same for a symmetric matrix of distances.

@@ -2,15 +2,17 @@
 //
 // Manifold harmonics (mesh/harmonics.h) are eigenvectors: another compiler may turn them. This basis spans what splines
 // span: around each of a number of anchor vertices a, the function
-//     (S + e I)^-p delta_a       (least-squares meshes and geometry-aware bases, sorkine 2004 and 2005: p = 2)
+//
+//   (S + e I)^-p delta_a       (least-squares meshes and geometry-aware bases, sorkine 2004 and 2005: p = 2)
+//
 // with the cotangent stiffness S of mesh/laplacian.h and a tiny e, p = 3 here (triharmonic: closer to the harmonics),
 // and one constant for each connected component. Anchors are chosen in rounds (sorkine 2005), where the mesh itself is
 // far from its projection on the functions found so far and where other anchors are far along its edges. A decoder that
 // has the mesh finds the same anchors, so they cost no bits.
 //
 // The functions are orthonormal (U' U = I, no masses: KG does not weigh by area), coarse ones first. Projection on
-// them: mesh/projection.h. The KG error of projecting real sequences on them, against as many harmonics:
-// 5 to 18 % lower for articulated motion, up to 10 % higher for cloth.
+// them: mesh/projection.h. The KG error of projecting real sequences on them, against as many harmonics: 5 to 18 %
+// lower for articulated motion, up to 10 % higher for cloth.
 #pragma once
 
 #include <cstdint>

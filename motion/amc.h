@@ -2,8 +2,7 @@
 //
 // A frame is a line with its number, then a line for the root and one for each bone with dofs, in any order. Frame
 // numbers go up by one; the first may be any. ":DEGREES", ":RADIANS" and ":SAMPLES-PER-SECOND n" are heeded, other ':'
-// lines and
-// '#' comments passed over. A file without a rate is at 120 Hz, as all of CMU's are.
+// lines and '#' comments passed over. A file without a rate is at 120 Hz, as all of CMU's are.
 //
 // Bad input throws Error{bad_input} with file and line: a bone that the ASF does not have, missing in a frame, twice in
 // one, or with too few or too many values; numbers that are none, nan or beyond 1e9; a frame number out of order; no
@@ -25,11 +24,9 @@ namespace kinespace {
 
 // Any clip as ASF and AMC, world positions kept to 2e-5 cm (6 decimals of centimetres and degrees):
 //  - joint 0 becomes "root", the others keep their names, with '_' for what the format cannot hold and a number behind
-//  a
-//    name that comes twice;
+//    a name that comes twice;
 //  - all axes are zero and lengths in cm (`length 2.54`, so that a unit is a centimetre); a bone that rotates has the
-//  dofs
-//    rx ry rz, one with a translation track has tx ty tz before them;
+//    dofs rx ry rz, one with a translation track has tx ty tz before them;
 //  - an ASF has no gaps: all children of a bone start at its end. A joint whose children start at different places gets
 //    rigid helper bones named PARENT_to_CHILD, which read back as joints of their own.
 struct AcclaimText {

@@ -9,15 +9,14 @@
 //
 //  - cm = value / (:units length) * 2.54; angles in degrees or, with "angle rad", in radians.
 //  - `axis a b c XYZ`: C turns about X, then Y, then Z of the fixed frame: C = Rz(c) Ry(b) Rx(a); for other letters in
-//  their
-//    order. A bone's rotation is C Rz Ry Rx C^-1 of its dof values, whatever the order of its dofs, which only says how
-//    the values stand in the AMC. That is no single Euler axis unless C is, so every bone with a rotation dof gets the
-//    three channels Z Y X, whatever its axis: skeletons of two subjects then have the same tree.
+//    their order. A bone's rotation is C Rz Ry Rx C^-1 of its dof values, whatever the order of its dofs, which only
+//    says how the values stand in the AMC. That is no single Euler axis unless C is, so every bone with a rotation dof
+//    gets the three channels Z Y X, whatever its axis: skeletons of two subjects then have the same tree.
 //  - dofs tx ty tz move the bone's start, by C t; such a joint has position channels before its rotations. The dof l (a
 //    bone that stretches) has no place in a skeleton of rigid bones: a clear error.
 //  - :root `order` says how the root's values stand in the AMC, `axis` the order of its rotations (XYZ: X first).
-//  `position`
-//    is where the root rests; as the AMC gives the root in the world, it moves no frame. `orientation` likewise.
+//    `position` is where the root rests; as the AMC gives the root in the world, it moves no frame. `orientation`
+//    likewise.
 //
 // Bad input throws Error{bad_input} with file and line: a bone without name, direction or length, twice, in no
 // hierarchy, in two places or in a cycle; a hierarchy that names unknown bones; numbers that are none, nan or beyond

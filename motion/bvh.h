@@ -4,11 +4,11 @@
 // too:
 //  - any channel order and count, 0 to 6 a joint, no channel twice; the rotation channels apply left to right;
 //  - position channels on any joint replace its OFFSET as a whole (an axis without a channel is 0). Where they vary
-//  they
-//    become a translation track; where they stay the same over the clip they become the joint's offset and no track;
+//    they become a translation track; where they stay the same over the clip they become the joint's offset and no
+//    track;
 //  - words in any case, names with spaces (runs of white space become one space), equal names, tabs, LF, CR LF and CR,
-//  a
-//    byte order mark, no newline at the end, End Sites anywhere (kept on leaves, where they mean something).
+//    a byte order mark, no newline at the end, End Sites anywhere (kept on leaves, where they mean something).
+//
 // One frame is one line. A frame time within 5e-5 of one over a whole number is that rate: 0.0333333 is 30 Hz.
 //
 // Units: a BVH has none. Its lengths are taken as centimetres, its angles are degrees, its Y is up.

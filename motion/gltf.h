@@ -7,6 +7,7 @@
 //    interpolate take the short way. A joint that keeps its pose has no sampler; joint 0 always has one, so that the
 //    clip's duration is there;
 //  - one small skinned mesh, an octahedron a bone, so that viewers show something.
+//
 // It is written only; there is no glTF reader. What a file cannot hold is lost: channel orders, and exact doubles (glTF
 // has 32-bit floats: 1e-5 cm within a few metres of the origin).
 #pragma once

@@ -1,11 +1,12 @@
 // Building a library so that nothing is lost: the old file stays as it is until the new one is complete.
 //
 // Beside the target LIB.kspace stand while it is built
+//
 //   LIB.kspace.partial   what was imported so far, committed in batches. It survives a kill, and the next build with
-//   the
-//                        same fingerprint goes on from there. A power cut may cost it: then it is found to be damaged
-//                        and the build starts over. Its lock keeps two builds of one library apart.
+//                        the same fingerprint goes on from there. A power cut may cost it: then it is found to be
+//                        damaged and the build starts over. Its lock keeps two builds of one library apart.
 //   LIB.kspace.new       the library's rows, once library() was called. Worth nothing after a kill; made anew.
+//
 // finish() flushes the new file to the disk, renames it over the target and removes the partial one, so a reader sees
 // the old library or the new one; a process that has the old one open keeps reading it. Extending copies the old rows
 // into a file made anew for the same reason: a transaction in place would have been as safe, but would make readers

@@ -4,8 +4,8 @@
 // f2 the first `window_s` seconds of the second (at most its first half), each over its own time [0, 1]. The scale u
 // and the shift v are sought for which motion 1 at time u s + v is most like motion 2 at time s,
 //
-//   E(u, v) = 1 / |S| integral over S of  sum_c w_c^2 (r_c f1_c(u s + v) - f2_c(s))^2 ds,     S = {s : s, u s + v in
-//   [0, 1]}
+//   E(u, v) = 1 / |S| integral over S of  sum_c w_c^2 (r_c f1_c(u s + v) - f2_c(s))^2 ds,
+//   S = {s : s, u s + v in [0, 1]}
 //
 // the mean over the overlap S, not the integral: else the smallest overlap always wins. The curves c are those that a
 // rigid motion in the ground plane leaves as they are (curve_sampler.h), so that places and directions do not count;
@@ -13,8 +13,8 @@
 //
 // With f(s) = sum_k x_k b_k(s) in K orthonormal functions of the motion space, E is a sum of three forms in the scores,
 //
-//   E = <P, S11> - 2 <Q, S12> + <W, S22>,   P = mean b(u s + v) b(u s + v)',  Q = mean b(u s + v) b(s)',  W = mean b(s)
-//   b(s)'
+//   E = <P, S11> - 2 <Q, S12> + <W, S22>,
+//   P = mean b(u s + v) b(u s + v)',  Q = mean b(u s + v) b(s)',  W = mean b(s) b(s)'
 //
 // and P, Q, W do not depend on the motions: they are tabulated once over a grid of (u, v). The best cells of the grid
 // are refined to the nearest minimum.

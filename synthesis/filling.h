@@ -1,10 +1,10 @@
 // Missing frames, estimated from what is seen on both sides and from a library of motions, with how sure that is.
 //
 // Method. At 30 Hz a window is the gap with `context_s` on either side: all curves (fpca/curves.h) as one vector-valued
-// function, its heading and ground position taken from the frame before the gap. The library's windows whose seen
-// part is nearest (poses and their change over 0.1 s, frames at the gap first) are weighted by a Gauss kernel and give
-// a mean mu and principal components Phi, found by their Gram matrix: far fewer windows than dimensions. What these
-// leave open, r, is a Gaussian process in time (Matern 3/2, length 0.8 s) that hits what is seen at the edges, so that
+// function, its heading and ground position taken from the frame before the gap. The library's windows whose seen part
+// is nearest (poses and their change over 0.1 s, frames at the gap first) are weighted by a Gauss kernel and give a
+// mean mu and principal components Phi, found by their Gram matrix: far fewer windows than dimensions. What these leave
+// open, r, is a Gaussian process in time (Matern 3/2, length 0.8 s) that hits what is seen at the edges, so that
 // nothing jumps, in place or in speed. With y = mu + Phi z + r, z normal, and V = cov(r) over the seen frames o,
 //
 //   z   = (I + Phi_o' V^-1 Phi_o)^-1 Phi_o' V^-1 (y_o - mu_o)                    (conditional expectation)

@@ -27,8 +27,7 @@ struct GapEstimate {
   int windows = 0;
 };
 
-// `query`: a track of shape.frames() frames. `search.count` is not looked at. Fewer than 2 windows: no
-// mean.
+// `query`: a track of shape.frames() frames. `search.count` is not looked at. Fewer than 2 windows: no mean.
 [[nodiscard]] GapEstimate estimate_gap(const FillLibrary& library, const FillOptions& options, const FillTrack& query,
                                        const WindowShape& shape, FillLibrary::Search search);
 

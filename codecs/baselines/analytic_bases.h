@@ -1,9 +1,8 @@
 // The analytic bases that yoo2019 (section 7.2) compares its functions with, orthonormal on the samples of a clip.
 //
-//   Fourier   1, cos(2 pi m t / n), sin(2 pi m t / n), m = 1, 2, ..: the series of a curve that repeats after n
-//   samples.
-//             Function 2 m - 1 is the cosine, 2 m the sine. By the chirp transform (bluestein 1970) over a transform of
-//             a power of two: n log n for every n
+//   Fourier   1, cos(2 pi m t / n), sin(2 pi m t / n), m = 1, 2, ..: the series of a curve that repeats after
+//             n samples. Function 2 m - 1 is the cosine, 2 m the sine. By the chirp transform (bluestein 1970) over a
+//             transform of a power of two: n log n for every n
 //   Legendre  polynomials of degree 0, 1, 2, .. that are orthonormal on n equal steps (gram's, or discrete chebyshev's;
 //             on a fine grid the Legendre polynomials). Each from its difference equation
 //                 (t+1)(t+1-n) (p(t+1) - p(t)) - t (t-n) (p(t) - p(t-1)) = k (k+1) p(t)

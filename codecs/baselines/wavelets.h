@@ -5,9 +5,8 @@
 //                        both sides, symmetric (so curves are mirrored at their ends and no jump stands there), within
 //                        a few percent of orthonormal
 //   cubic_interpolating  the wavelet that beaudoin, poulin, van de panne 2007 take: odd samples less the cubic through
-//                        their four even neighbours (deslauriers, dubuc 1989), even samples
-//                        updated by 9/32 and -1/32 of the four details around them (sweldens 1996), so that the coarse
-//                        curve keeps the mean
+//                        their four even neighbours (deslauriers, dubuc 1989), even samples updated by 9/32 and -1/32
+//                        of the four details around them (sweldens 1996), so that the coarse curve keeps the mean
 //
 // Coefficients stand from coarse to fine: the coarse curve, then the details of each level. They are scaled so that
 // every one has a basis curve of unit length (in the middle of a long curve; to 1 % for the cubic one), so that one

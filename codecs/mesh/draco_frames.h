@@ -1,7 +1,7 @@
 // mesh-draco: each frame by itself with Draco, on one grid; to compare with.
 //
-//   setup   layout and grid
-//   order   the order of vertices (key_mesh.h), that of the first frame
+//   setup        layout and grid
+//   order        the order of vertices (key_mesh.h), that of the first frame
 //   f0, f1, ..   each frame's surface; o1, ..: its order where it is another
 #pragma once
 

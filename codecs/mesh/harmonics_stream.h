@@ -1,10 +1,12 @@
 // The parts of a mesh-harmonics stream of the standard profile.
 //
-//   setup    layout; grid of the key-frame; size of the mesh, step, functions, rotations on or off, coarse counts
-//   surface, order            the key-frame (key_mesh.h)
+//   setup                                  layout; grid of the key-frame; size of the mesh, step, functions, rotations
+//                                          on or off, coarse counts
+//   surface, order                         the key-frame (key_mesh.h)
 //   coarse, coarse.surface, coarse.order   multi-resolution: which vertices stay, and their triangles
-//   rigid    the motion of the whole (rigid_track.h)
-//   m0, d0, m1, d1, ..        by blocks of frames: coefficients of the functions, and residuals of the vertices
+//   rigid                                  the motion of the whole (rigid_track.h)
+//   m0, d0, m1, d1, ..                     by blocks of frames: coefficients of the functions, and residuals of the
+//                                          vertices
 #pragma once
 
 #include <cstdint>

@@ -6,9 +6,9 @@
 // from decoded values. Details come by deformation transfer from the key-frame (mesh/deformation.h), then the low
 // frequencies are set right, which costs no bits. Key-frames themselves are what Draco gives.
 //
-//   setup     layout, grid, size, step, functions, clusters; a checksum of each key-frame's harmonics
+//   setup                   layout, grid, size, step, functions, clusters; a checksum of each key-frame's harmonics
 //   surface, order, rigid   as in harmonics_stream.h
-//   clusters  the cluster of each frame, and the key-frames
+//   clusters                the cluster of each frame, and the key-frames
 //   a0, q0, a1, q1, ..      by cluster: prediction coefficients, and what they miss
 #pragma once
 

@@ -1,10 +1,10 @@
 // The code of one joint's curve in a qbc stream: quadratic Bezier segments with quantised control points.
 //
-//   of the travel root: frames that are corrected (codecs/qbc/frame_corrections.h)
-//   the curve at the common breaks, every `interval` frames and at the last (the paper's I frames): a preview reads no
-//   further
-//   for each interval: how many segments, their lengths in grid steps; then for each its end (but for the last, whose
-//   end is there already) and its middle
+//   - of the travel root: frames that are corrected (codecs/qbc/frame_corrections.h)
+//   - the curve at the common breaks, every `interval` frames and at the last (the paper's I frames): a preview reads
+//     no further
+//   - for each interval: how many segments, their lengths in grid steps; then for each its end (but for the last, whose
+//     end is there already) and its middle
 //
 // Every number is a whole number of steps away from a prediction that both sides make from what is there: ends go on
 // with the slope of the segment before and towards the next common break, middles lean on both ends and on that slope.

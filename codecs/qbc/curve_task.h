@@ -39,6 +39,7 @@ struct BernsteinGram {
 [[nodiscard]] const BernsteinGram& bernstein_gram(int length);
 
 // What a segment (first, last] asks of its control points: the squared error of any is
+//
 //   square - 2 sum_k r_k P_k + sum_kl P_k g_kl P_l
 struct SegmentSums {
   Point r0{}, r1{}, r2{};

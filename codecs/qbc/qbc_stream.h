@@ -4,9 +4,8 @@
 //   curves   length and bytes of the joints' channels (codecs/joint_channels.h); length and bytes of the table of
 //            curves; the curves, clip by clip and joint by joint. Joints that never turn have none
 //
-// The table: the interval of the common breaks, the quantiser step and the root's unit; of each curve how much
-// finer its step is, log2 of the grid that its breaks stand on, and how many bytes it has.
-// Private to this folder.
+// The table: the interval of the common breaks, the quantiser step and the root's unit; of each curve how much finer
+// its step is, log2 of the grid that its breaks stand on, and how many bytes it has. Private to this folder.
 #pragma once
 
 #include <string>

@@ -1,10 +1,13 @@
 // Similar-posture paths: valleys of the self-distance table, along which one stretch of motion runs like another
 // (lin2011 section 4.2.1, steps 1 to 7).
 //
-// 1. Pixels above a threshold are dropped. 2. Those that are minima along their row or their column are labelled, those
-// along both are 2D minima. 3. From a 2D minimum, the nearest first, the path of least cost over labelled pixels leads
-// to the upper left and to the lower right, 4., 5. until every 2D minimum is on a path. 6. A path goes on in another
-// that begins within `bridge_s` to its lower right. 7. Short paths go.
+//   1.     Pixels above a threshold are dropped.
+//   2.     Those that are minima along their row or their column are labelled, those along both are 2D minima.
+//   3.     From a 2D minimum, the nearest first, the path of least cost over labelled pixels leads to the upper left
+//          and to the lower right,
+//   4. 5.  until every 2D minimum is on a path.
+//   6.     A path goes on in another that begins within `bridge_s` to its lower right.
+//   7.     Short paths go.
 //
 // Only i < j is looked at: the table is symmetric. Both indices of a path never fall along it, and each stays inside
 // one run of the table.

@@ -1,9 +1,13 @@
 // What a stream of the default profile holds, and the way back from it to clips.
 //
-// Sections: clips (clip_table.h); tables (motion_space_tables.h: step, basis, spectrum of windows that stand for
-// themselves); repeats (predictions by window, seams that are jumps, contacts; with predictions the spectrum and the
-// start of the models of predicted windows); windows (a code for each group of about 4096 frames: first of the windows
-// that stand for themselves, then of the predicted ones, each decodable without other groups).
+// Sections:
+//
+//   clips    as in clip_table.h
+//   tables   motion_space_tables.h: step, basis, spectrum of windows that stand for themselves
+//   repeats  predictions by window, seams that are jumps, contacts; with predictions the spectrum and the start of the
+//            models of predicted windows
+//   windows  a code for each group of about 4096 frames: first of the windows that stand for themselves, then of the
+//            predicted ones, each decodable without other groups
 #pragma once
 
 #include <array>

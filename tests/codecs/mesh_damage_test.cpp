@@ -157,8 +157,7 @@ TEST(MeshDamageOfBasis, a_checksum_that_does_not_match_is_an_error) {
 }
 
 // A basis is what a stream may ask most memory for: vertices times functions. As many functions as there are vertices
-// are an honest stream's right, up to most_mesh_numbers; opening must hold no more than three tables of
-// that size.
+// are an honest stream's right, up to most_mesh_numbers; opening must hold no more than three tables of that size.
 TEST(MeshDamageOfBasis, memory_for_functions_is_bounded_by_the_size_of_the_stream) {
   for (const MeshProfile profile : {MeshProfile::standard, MeshProfile::paper}) {
     const MeshSequence mesh = bending_tube(profile == MeshProfile::paper ? 700 : 1600, 3, 1.0);
