@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 

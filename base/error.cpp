@@ -1,8 +1,8 @@
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 #include <utility>
 
-#include "base/printable.h"
+#include "kinespace/base/printable.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "base/file.h"
+#include "kinespace/base/file.h"
 
 #include <algorithm>
 #include <array>
@@ -21,8 +21,8 @@
 #include <unistd.h>
 #include <xxhash.h>
 
-#include "base/error.h"
-#include "base/file_kind.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file_kind.h"
 
 namespace kinespace {
 namespace {

@@ -17,7 +17,7 @@
 #include <string>
 #include <string_view>
 
-#include "base/file_kind.h"
+#include "kinespace/base/file_kind.h"
 
 namespace kinespace {
 

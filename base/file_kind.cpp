@@ -1,4 +1,4 @@
-#include "base/file_kind.h"
+#include "kinespace/base/file_kind.h"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "base/pages.h"
+#include "kinespace/base/pages.h"
 
 #include <cstdint>
 

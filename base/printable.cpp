@@ -1,4 +1,4 @@
-#include "base/printable.h"
+#include "kinespace/base/printable.h"
 
 namespace kinespace {
 namespace {

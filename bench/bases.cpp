@@ -6,13 +6,13 @@
 #include <filesystem>
 #include <vector>
 
-#include "bench/space.h"
 #include <fmt/format.h>
 
-#include "fpca/analytic_basis.h"
-#include "fpca/library_builder.h"
-#include "fpca/space_builder.h"
-#include "motion/read.h"
+#include "bench/space.h"
+#include "kinespace/fpca/analytic_basis.h"
+#include "kinespace/fpca/space_builder.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

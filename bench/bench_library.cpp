@@ -1,6 +1,6 @@
 #include "bench/bench_library.h"
 
-#include "fpca/library_builder.h"
+#include "kinespace/library/library_builder.h"
 
 namespace kinespace {
 

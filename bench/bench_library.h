@@ -7,8 +7,7 @@
 #include <vector>
 
 #include "bench/scratch_folder.h"
-
-#include "fpca/library_view.h"
+#include "kinespace/library/library_view.h"
 
 namespace kinespace {
 

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <limits>
 
-#include "bench/plot.h"
 #include <fmt/format.h>
 
-#include "codecs/registry.h"
+#include "bench/plot.h"
+#include "kinespace/codecs/registry.h"
 
 namespace kinespace {
 namespace {

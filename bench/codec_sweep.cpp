@@ -6,10 +6,10 @@
 
 #include <fmt/format.h>
 
-#include "codecs/registry.h"
-#include "motion/error_measures.h"
-#include "motion/euler.h"
-#include "motion/read.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/euler.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "codecs/clip_error.h"
-#include "codecs/codec.h"
-#include "motion/amc.h"
+#include "kinespace/codecs/stream/clip_error.h"
+#include "kinespace/codecs/stream/codec.h"
+#include "kinespace/motion/amc.h"
 
 namespace kinespace {
 

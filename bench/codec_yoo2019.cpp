@@ -5,16 +5,16 @@
 #include <optional>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "bench/codec_papers.h"
 #include "bench/plot.h"
 #include "bench/space.h"
-#include <fmt/format.h>
-
-#include "fpca/analytic_basis.h"
-#include "fpca/library_builder.h"
-#include "fpca/space_builder.h"
-#include "motion/error_measures.h"
-#include "motion/read.h"
+#include "kinespace/fpca/analytic_basis.h"
+#include "kinespace/fpca/space_builder.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

@@ -8,17 +8,17 @@
 #include <thread>
 #include <vector>
 
-#include "bench/codec_papers.h"
-#include "bench/report.h"
-#include "bench/timing.h"
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
-#include "codecs/joint_channels.h"
-#include "codecs/quadratic_bezier.h"
-#include "codecs/registry.h"
-#include "fpca/library_builder.h"
-#include "motion/read.h"
+#include "bench/codec_papers.h"
+#include "bench/report.h"
+#include "bench/timing.h"
+#include "kinespace/codecs/qbc/quadratic_bezier.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/codecs/stream/joint_channels.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

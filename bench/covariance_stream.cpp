@@ -8,12 +8,12 @@
 #include <limits>
 #include <numbers>
 
-#include "bench/timing.h"
 #include <cblas.h>
 #include <oneapi/tbb/global_control.h>
 
-#include "base/error.h"
-#include "kernels/covariance.h"
+#include "bench/timing.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/covariance.h"
 
 extern "C" void dsyevd_(const char* job, const char* half, const int* n, double* a, const int* stride, double* values,
                         double* work, const int* work_size, int* integers, const int* integers_size, int* status);

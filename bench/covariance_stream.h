@@ -4,8 +4,7 @@
 #include <vector>
 
 #include "bench/report.h"
-
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 
 namespace kinespace {
 

@@ -1,5 +1,5 @@
 // `kinespace bench dtw`: batched time warping on the device against a plain loop in double on one thread.
-#include "kernels/dtw.h"
+#include "kinespace/kernels/dtw.h"
 
 #include <algorithm>
 #include <chrono>
@@ -11,10 +11,9 @@
 
 #include "bench/report.h"
 #include "bench/timing.h"
-
-#include "base/error.h"
-#include "fpca/pose_features.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/pose_features.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

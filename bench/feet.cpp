@@ -8,15 +8,15 @@
 #include <tuple>
 #include <vector>
 
-#include "bench/report.h"
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
+#include "bench/report.h"
 #include "examples/contact_training.h"
-#include "footskate/cleanup.h"
-#include "footskate/skate_measures.h"
-#include "fpca/library_builder.h"
-#include "motion/read.h"
+#include "kinespace/footskate/cleanup.h"
+#include "kinespace/footskate/skate_measures.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

@@ -1,6 +1,6 @@
 // `kinespace bench filling`: gaps cut into clips that the library does not have, filled, against the truth and against
 // straight lines and slerp.
-#include "synthesis/filling.h"
+#include "kinespace/synthesis/filling.h"
 
 #include <array>
 #include <chrono>
@@ -9,14 +9,14 @@
 #include <mutex>
 #include <vector>
 
-#include "bench/filling_measures.h"
-#include "bench/report.h"
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "fpca/library_builder.h"
-#include "motion/kinematics.h"
-#include "motion/read.h"
+#include "bench/filling_measures.h"
+#include "bench/report.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "fpca/curves.h"
-#include "motion/kinematics.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "motion/clip.h"
-#include "synthesis/filling_gap.h"
+#include "kinespace/motion/clip.h"
+#include "kinespace/synthesis/filling_gap.h"
 
 namespace kinespace {
 

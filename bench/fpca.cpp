@@ -12,15 +12,15 @@
 #include <string>
 #include <vector>
 
-#include "bench/covariance_stream.h"
-#include "bench/report.h"
-#include "bench/space.h"
 #include <cblas.h>
 
-#include "fpca/curves.h"
-#include "fpca/functional_pca.h"
-#include "fpca/golden.h"
-#include "motion/read.h"
+#include "bench/covariance_stream.h"
+#include "bench/golden.h"
+#include "bench/report.h"
+#include "bench/space.h"
+#include "kinespace/fpca/functional_pca.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

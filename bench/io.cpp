@@ -9,16 +9,16 @@
 #include <string>
 #include <vector>
 
-#include "bench/report.h"
 #include <fmt/format.h>
 #include <tbb/parallel_for_each.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "motion/amc.h"
-#include "motion/bvh.h"
-#include "motion/kinematics.h"
-#include "motion/read.h"
+#include "bench/report.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

@@ -5,8 +5,7 @@
 #include <thread>
 
 #include "bench/report.h"
-
-#include "kernels/kernel_descriptor.h"
+#include "kinespace/kernels/kernel_descriptor.h"
 
 namespace kinespace {
 namespace {

@@ -11,17 +11,17 @@
 #include <utility>
 #include <vector>
 
-#include "bench/report.h"
-#include "bench/scratch_folder.h"
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "base/error.h"
-#include "motion/bvh.h"
-#include "motion/read.h"
+#include "bench/report.h"
+#include "bench/scratch_folder.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

@@ -7,16 +7,16 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+
 #include "bench/mesh_measures.h"
 #include "bench/mesh_tables.h"
 #include "bench/plot.h"
 #include "bench/report.h"
 #include "bench/timing.h"
-#include <fmt/format.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-
-#include "mesh/mesh_files.h"
+#include "kinespace/mesh/mesh_files.h"
 
 namespace kinespace {
 namespace {

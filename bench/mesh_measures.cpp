@@ -8,18 +8,18 @@
 #include <optional>
 #include <string>
 
-#include "bench/timing.h"
 #include <malloc.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
-#include "codecs/mesh/harmonics_analysis.h"
-#include "codecs/mesh/step_search.h"
-#include "mesh/harmonics.h"
-#include "mesh/mesh_error.h"
-#include "mesh/projection.h"
-#include "mesh/rigid.h"
-#include "mesh/smooth_basis.h"
+#include "bench/timing.h"
+#include "kinespace/mesh/harmonics.h"
+#include "kinespace/mesh/mesh_error.h"
+#include "kinespace/mesh/projection.h"
+#include "kinespace/mesh/rigid.h"
+#include "kinespace/mesh/smooth_basis.h"
+#include "kinespace/mesh_codecs/harmonics_analysis.h"
+#include "kinespace/mesh_codecs/step_search.h"
 
 namespace kinespace {
 namespace {

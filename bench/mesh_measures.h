@@ -5,9 +5,9 @@
 #include <functional>
 #include <string_view>
 
-#include "base/bytes.h"
-#include "codecs/mesh/mesh_codec.h"
-#include "mesh/mesh_sequence.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/mesh/mesh_sequence.h"
+#include "kinespace/mesh_codecs/mesh_codec.h"
 
 namespace kinespace {
 

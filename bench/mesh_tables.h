@@ -6,8 +6,7 @@
 
 #include "bench/plot.h"
 #include "bench/report.h"
-
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

@@ -13,13 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include "bench/report.h"
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "fpca/library_builder.h"
-#include "motion/read.h"
-#include "synthesis/player.h"
+#include "bench/report.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/synthesis/player.h"
 
 namespace kinespace {
 namespace {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "motion/strip_svg.h"
+#include "kinespace/motion/strip_svg.h"
 
 namespace kinespace {
 namespace {

@@ -10,16 +10,16 @@
 #include <numeric>
 #include <vector>
 
-#include "bench/report.h"
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "fpca/clip_space.h"
-#include "fpca/library_builder.h"
-#include "fpca/pose_features.h"
-#include "kernels/dtw.h"
-#include "motion/read.h"
+#include "bench/report.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/clip_space.h"
+#include "kinespace/fpca/pose_features.h"
+#include "kinespace/kernels/dtw.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

@@ -7,15 +7,15 @@
 #include <map>
 #include <thread>
 
-#include "bench/report.h"
-#include "bench/rma_measures.h"
 #include <fmt/format.h>
 
-#include "codecs/registry.h"
-#include "codecs/rma/markers.h"
-#include "codecs/rma/repeats.h"
-#include "fpca/library_builder.h"
-#include "motion/read.h"
+#include "bench/report.h"
+#include "bench/rma_measures.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/codecs/rma/markers.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/repeats/repeats.h"
 
 namespace kinespace {
 namespace {

@@ -4,14 +4,14 @@
 #include <cmath>
 #include <limits>
 
-#include "bench/timing.h"
 #include <tbb/parallel_for.h>
 
-#include "codecs/clip_error.h"
-#include "codecs/registry.h"
-#include "codecs/rma/rma_codec.h"
-#include "footskate/skate_measures.h"
-#include "motion/kinematics.h"
+#include "bench/timing.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/codecs/rma/rma_codec.h"
+#include "kinespace/codecs/stream/clip_error.h"
+#include "kinespace/footskate/skate_measures.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

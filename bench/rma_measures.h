@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "codecs/codec.h"
+#include "kinespace/codecs/stream/codec.h"
 
 namespace kinespace {
 

@@ -10,15 +10,15 @@
 #include <utility>
 #include <vector>
 
-#include "bench/report.h"
 #include <nanoflann.hpp>
 #include <tbb/parallel_for.h>
 
-#include "fpca/library_builder.h"
-#include "kernels/simd.h"
-#include "motion/read.h"
-#include "synthesis/vector_search.h"
-#include "synthesis/window_space.h"
+#include "bench/report.h"
+#include "kinespace/kernels/simd.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/synthesis/vector_search.h"
+#include "kinespace/synthesis/window_space.h"
 
 namespace kinespace {
 namespace {

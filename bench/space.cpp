@@ -10,10 +10,10 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "fpca/space_builder.h"
-#include "motion/kinematics.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/space_builder.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {

@@ -2,8 +2,7 @@
 #pragma once
 
 #include "bench/report.h"
-
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 
 namespace kinespace {
 

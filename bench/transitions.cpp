@@ -6,16 +6,16 @@
 #include <random>
 #include <vector>
 
-#include "bench/bench_library.h"
-#include "bench/report.h"
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#include "synthesis/connection.h"
-#include "synthesis/motion_graph.h"
-#include "synthesis/transition.h"
-#include "synthesis/transition_plan.h"
+#include "bench/bench_library.h"
+#include "bench/report.h"
+#include "kinespace/synthesis/connection.h"
+#include "kinespace/synthesis/motion_graph.h"
+#include "kinespace/synthesis/transition.h"
+#include "kinespace/synthesis/transition_plan.h"
 
 namespace kinespace {
 namespace {

@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "bench/report.h"
 #include <fmt/format.h>
 
-#include "base/file.h"
+#include "bench/report.h"
 #include "cli/commands.h"
 #include "cli/output.h"
 #include "cli/session.h"
+#include "kinespace/base/file.h"
 
 namespace kinespace::cli {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
-#include "fpca/library_builder.h"
+#include "kinespace/library/library_builder.h"
 
 namespace kinespace::cli {
 namespace {

@@ -3,13 +3,13 @@
 #include <optional>
 #include <utility>
 
-#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
-#include "footskate/cleanup.h"
-#include "footskate/contact_labels.h"
-#include "motion/read.h"
-#include "motion/strip.h"
+#include "kinespace/base/file.h"
+#include "kinespace/footskate/cleanup.h"
+#include "kinespace/footskate/contact_labels.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/motion/strip.h"
 
 namespace kinespace::cli {
 namespace {

@@ -3,9 +3,9 @@
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
-#include "footskate/skate_measures.h"
-#include "motion/error_measures.h"
-#include "motion/read.h"
+#include "kinespace/footskate/skate_measures.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
 namespace {

@@ -7,15 +7,15 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
-#include "footskate/contact_labels.h"
-#include "fpca/library_view.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/base/printable.h"
+#include "kinespace/footskate/contact_labels.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
 namespace {

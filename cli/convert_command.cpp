@@ -4,10 +4,10 @@
 
 #include <fmt/format.h>
 
-#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
-#include "motion/read.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
 namespace {

@@ -11,14 +11,14 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/stream_file.h"
-#include "codecs/registry.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/base/printable.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
 namespace {

@@ -8,7 +8,7 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 
 namespace kinespace::cli {
 namespace {

@@ -10,16 +10,16 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
-#include "codecs/clip_error.h"
-#include "codecs/library_basis.h"
-#include "codecs/registry.h"
-#include "fpca/library_builder.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/codecs/pose_space/library_basis.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/codecs/stream/clip_error.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
 namespace {
@@ -103,7 +103,7 @@ std::map<std::string, double, std::less<>> all_settings(const EncodeOptions& opt
 void run_encode(const EncodeOptions& options, Session& session) {
   const Progress progress = session.progress();
   const std::vector<Clip> clips = read_clips(input_files(options.inputs), progress);
-  std::optional<MotionSpaceBasis> basis;
+  std::optional<PoseSpaceBasis> basis;
   if (options.basis) {
     basis = library_basis(*options.basis, clips.front().skeleton.tree_hash(), progress);
   }

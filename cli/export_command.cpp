@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
-#include "fpca/library_view.h"
-#include "motion/read.h"
+#include "kinespace/base/file.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
 namespace {

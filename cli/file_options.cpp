@@ -6,10 +6,10 @@
 #include <string_view>
 #include <utility>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "motion/read.h"
-#include "motion/text.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace::cli {
 namespace {

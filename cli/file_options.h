@@ -11,7 +11,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/file_kind.h"
+#include "kinespace/base/file_kind.h"
 
 namespace kinespace::cli {
 

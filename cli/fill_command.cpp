@@ -6,14 +6,14 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
-#include "motion/read.h"
-#include "motion/strip.h"
-#include "synthesis/filling.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/motion/strip.h"
+#include "kinespace/synthesis/filling.h"
 
 namespace kinespace::cli {
 namespace {

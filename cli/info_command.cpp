@@ -7,18 +7,18 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
 #include "cli/repeat_report.h"
 #include "cli/stream_file.h"
-#include "codecs/registry.h"
-#include "fpca/library_view.h"
-#include "motion/plausibility.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/base/printable.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/motion/plausibility.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "base/printable.h"
 #include "cli/output.h"
+#include "kinespace/base/printable.h"
 
 namespace kinespace::cli {
 namespace {

@@ -17,12 +17,12 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "base/error.h"
-#include "base/progress.h"
 #include "cli/commands.h"
 #include "cli/output.h"
 #include "cli/session.h"
 #include "cli/user_words.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/progress.h"
 
 namespace {
 

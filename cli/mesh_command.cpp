@@ -7,16 +7,16 @@
 #include <optional>
 #include <string>
 
-#include "base/error.h"
-#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
-#include "codecs/mesh/basis_cache.h"
-#include "codecs/mesh/mesh_codec.h"
-#include "mesh/mesh_error.h"
-#include "mesh/mesh_files.h"
-#include "mesh/mesh_report.h"
-#include "mesh/picture.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/mesh/mesh_error.h"
+#include "kinespace/mesh/mesh_files.h"
+#include "kinespace/mesh/mesh_report.h"
+#include "kinespace/mesh/picture.h"
+#include "kinespace/mesh_codecs/basis_cache.h"
+#include "kinespace/mesh_codecs/mesh_codec.h"
 
 namespace kinespace::cli {
 namespace {

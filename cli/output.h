@@ -12,7 +12,7 @@
 
 #include <fmt/format.h>
 
-#include "base/printable.h"
+#include "kinespace/base/printable.h"
 
 namespace kinespace::cli {
 

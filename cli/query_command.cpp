@@ -4,14 +4,14 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "base/printable.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
-#include "motion/read.h"
-#include "synthesis/retrieval.h"
-#include "synthesis/windows.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/printable.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/synthesis/retrieval.h"
+#include "kinespace/synthesis/windows.h"
 
 namespace kinespace::cli {
 namespace {

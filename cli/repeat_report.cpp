@@ -6,16 +6,16 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "base/printable.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
-#include "codecs/rma/markers.h"
-#include "codecs/rma/repeat_picture.h"
-#include "codecs/rma/repeats.h"
-#include "fpca/library_builder.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/base/printable.h"
+#include "kinespace/codecs/rma/markers.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/repeats/repeat_picture.h"
+#include "kinespace/repeats/repeats.h"
 
 namespace kinespace::cli {
 namespace {

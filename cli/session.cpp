@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 #include "cli/output.h"
-#include "motion/plausibility.h"
+#include "kinespace/motion/plausibility.h"
 
 namespace kinespace::cli {
 namespace {

@@ -6,10 +6,10 @@
 #include <string>
 #include <string_view>
 
-#include "base/progress.h"
 #include "cli/file_options.h"
 #include "cli/progress_bar.h"
-#include "motion/clip.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace::cli {
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <optional>
 
-#include "base/file.h"
-#include "codecs/registry.h"
+#include "kinespace/base/file.h"
+#include "kinespace/codecs/registry.h"
 
 namespace kinespace::cli {
 

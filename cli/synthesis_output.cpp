@@ -1,9 +1,9 @@
 #include "cli/synthesis_output.h"
 
-#include "base/file.h"
 #include "cli/session.h"
-#include "footskate/cleanup.h"
-#include "motion/read.h"
+#include "kinespace/base/file.h"
+#include "kinespace/footskate/cleanup.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
 

@@ -7,8 +7,8 @@
 
 #include "cli/json_output.h"
 #include "cli/session.h"
-#include "motion/clip.h"
-#include "motion/strip.h"
+#include "kinespace/motion/clip.h"
+#include "kinespace/motion/strip.h"
 
 namespace kinespace::cli {
 

@@ -5,8 +5,8 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/synthesis_output.h"
-#include "motion/read.h"
-#include "synthesis/transition_plan.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/synthesis/transition_plan.h"
 
 namespace kinespace::cli {
 namespace {

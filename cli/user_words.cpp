@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "base/nearest_name.h"
+#include "kinespace/base/nearest_name.h"
 
 namespace kinespace::cli {
 namespace {

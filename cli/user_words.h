@@ -8,7 +8,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace::cli {
 

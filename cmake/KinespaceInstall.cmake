@@ -18,8 +18,10 @@ foreach(module IN LISTS installed_modules)
   list(APPEND installed_targets kinespace_${module})
   get_target_property(folder kinespace_${module} SOURCE_DIR)
   install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/kinespace FILES_MATCHING PATTERN "*.h"
-          REGEX "gltf/(tiny|arrays|fields)\\.h$" EXCLUDE)  # of libraries that their users need not have
+          PATTERN detail EXCLUDE                   # private to its folder
+          REGEX "gltf/(tiny|arrays)\\.h$" EXCLUDE)  # of libraries that their users need not have
 endforeach()
+install(FILES include/kinespace.h ${KINESPACE_INCLUDE}/kinespace/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/kinespace)
 install(TARGETS kinespace_command RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ${installed_targets} EXPORT kinespaceTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 

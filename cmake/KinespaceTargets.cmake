@@ -1,5 +1,7 @@
-# kinespace_module(NAME SOURCES a.cpp ... [DEPENDS target ...] [PRIVATE_DEPENDS target ...])
-# makes the library kinespace_NAME of one folder, with the project's warnings, and queues it for installation.
+# kinespace_module(NAME [SOURCES a.cpp ...] [GENERATED a.cpp ...] [DEPENDS target ...] [PRIVATE_DEPENDS target ...])
+# makes the library kinespace_NAME of one folder, with the project's warnings, and queues it for installation. Its sources are
+# all of the folder and of those below it, but where SOURCES names them; GENERATED: those that the build writes.
+# Its headers are included as "kinespace/FOLDER/header.h", here as where they are installed.
 set(KINESPACE_MODULES "" CACHE INTERNAL "modules, in the order of the arrows")
 
 set(CMAKE_CXX_EXTENSIONS OFF)
@@ -34,14 +36,31 @@ if(NOT DEFINED CMAKE_UNITY_BUILD_BATCH_SIZE)
   set(CMAKE_UNITY_BUILD_BATCH_SIZE 16)
 endif()
 
+set(KINESPACE_INCLUDE ${PROJECT_BINARY_DIR}/include)
+file(MAKE_DIRECTORY ${KINESPACE_INCLUDE}/kinespace)
+configure_file(${PROJECT_SOURCE_DIR}/include/version.h.in ${KINESPACE_INCLUDE}/kinespace/version.h @ONLY)
+file(CREATE_LINK ${PROJECT_SOURCE_DIR}/include/kinespace.h ${KINESPACE_INCLUDE}/kinespace/kinespace.h SYMBOLIC)
+
+# kinespace_folder_sources(OUT): the .cpp files of the current folder and of those below it, in the order of their names.
+function(kinespace_folder_sources out)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/*.cpp)
+  list(SORT sources)
+  set(${out} ${sources} PARENT_SCOPE)
+endfunction()
+
 function(kinespace_module name)
-  cmake_parse_arguments(arg "" "" "SOURCES;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
+  cmake_parse_arguments(arg "" "" "SOURCES;GENERATED;DEPENDS;PRIVATE_DEPENDS" ${ARGN})
   set(target kinespace_${name})
-  add_library(${target} STATIC ${arg_SOURCES})
+  if(NOT arg_SOURCES)
+    kinespace_folder_sources(arg_SOURCES)
+  endif()
+  get_filename_component(folder ${CMAKE_CURRENT_SOURCE_DIR} NAME)
+  file(CREATE_LINK ${CMAKE_CURRENT_SOURCE_DIR} ${KINESPACE_INCLUDE}/kinespace/${folder} SYMBOLIC)
+  add_library(${target} STATIC ${arg_SOURCES} ${arg_GENERATED})
   add_library(kinespace::${name} ALIAS ${target})
   set_target_properties(${target} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON)
   target_compile_features(${target} PUBLIC cxx_std_20)
-  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:include/kinespace>)
+  target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${KINESPACE_INCLUDE}> $<INSTALL_INTERFACE:include>)
   target_link_libraries(${target} PUBLIC ${arg_DEPENDS} PRIVATE ${arg_PRIVATE_DEPENDS} $<BUILD_INTERFACE:kinespace_build_flags>)
   set(KINESPACE_MODULES ${KINESPACE_MODULES} ${name} CACHE INTERNAL "modules, in the order of the arrows")
 endfunction()

@@ -6,15 +6,13 @@
 #include <string>
 #include <string_view>
 
-#include "codecs/codec.h"
+#include "kinespace/codecs/stream/codec.h"
 
 namespace kinespace {
 
 [[nodiscard]] std::span<const Codec* const> all_codecs();
 // Throws Error{usage} naming those there are.
 [[nodiscard]] const Codec& find_codec(std::string_view name);
-// The kind of that codec's streams.
-[[nodiscard]] std::string stream_kind(std::string_view codec);
 
 // Checks clips and options, then encodes.
 [[nodiscard]] Bytes encode(std::string_view codec, std::span<const Clip> clips, const CodecOptions& options = {});
@@ -25,7 +23,7 @@ namespace kinespace {
 // must outlive the reader. `basis`: where the stream was made with one (basis_of). Throws Error{bad_input}, and
 // Error{usage} when the basis it needs is not given.
 [[nodiscard]] std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std::string source,
-                                                        const MotionSpaceBasis* basis = nullptr);
+                                                        const PoseSpaceBasis* basis = nullptr);
 
 // The id of the basis that a stream needs; empty when it needs none. Throws Error{bad_input}.
 [[nodiscard]] std::string basis_of(std::span<const std::byte> bytes, std::string source);

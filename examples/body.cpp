@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
 #include "examples/smooth.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace::samples {
 namespace {

@@ -7,7 +7,7 @@
 #include <Eigen/Geometry>
 
 #include "examples/footsteps.h"
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace::samples {
 

@@ -2,8 +2,8 @@
 #include <cstdio>
 #include <exception>
 
-#include "base/file.h"
 #include "examples/contact_training.h"
+#include "kinespace/base/file.h"
 
 int main(int argc, char** argv) {
   if (argc != 2) {

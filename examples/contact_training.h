@@ -4,7 +4,7 @@
 #include <string>
 
 #include "examples/sample_motions.h"
-#include "footskate/contact_model.h"
+#include "kinespace/footskate/contact_model.h"
 
 namespace kinespace {
 

@@ -5,9 +5,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "base/error.h"
 #include "examples/sample_files.h"
 #include "examples/sample_motions.h"
+#include "kinespace/base/error.h"
 
 namespace {
 

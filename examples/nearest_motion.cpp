@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "base/error.h"
-#include "fpca/library_builder.h"
-#include "motion/read.h"
-#include "synthesis/retrieval.h"
+#include "kinespace/base/error.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/synthesis/retrieval.h"
 
 int main(int argc, char** argv) {
   if (argc != 3) {

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
-#include "motion/read.h"
-#include "synthesis/motion_engine.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/synthesis/motion_engine.h"
 
 int main(int argc, char** argv) {
   if (argc != 4) {

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace::samples {
 namespace {

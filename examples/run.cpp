@@ -3,10 +3,10 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
 #include "examples/gait.h"
 #include "examples/posture.h"
 #include "examples/sample_motions.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "base/file.h"
-#include "motion/read.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace {
 

@@ -25,7 +25,7 @@
 #include <string_view>
 #include <vector>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

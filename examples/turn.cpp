@@ -1,9 +1,9 @@
 #include <cmath>
 
-#include "base/error.h"
 #include "examples/performance.h"
 #include "examples/posture.h"
 #include "examples/sample_motions.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <iostream>
 
-#include "base/error.h"
-#include "mesh/mesh_files.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/mesh_files.h"
 
 namespace {
 

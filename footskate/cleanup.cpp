@@ -1,4 +1,4 @@
-#include "footskate/cleanup.h"
+#include "kinespace/footskate/cleanup.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,12 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "footskate/contact_model.h"
-#include "footskate/leg_pose.h"
-#include "footskate/leg_swing.h"
-#include "footskate/root_path.h"
-#include "footskate/skate_measures.h"
+#include "kinespace/base/error.h"
+#include "kinespace/footskate/contact_model.h"
+#include "kinespace/footskate/detail/leg_pose.h"
+#include "kinespace/footskate/detail/leg_swing.h"
+#include "kinespace/footskate/detail/root_path.h"
+#include "kinespace/footskate/skate_measures.h"
 
 namespace kinespace {
 namespace {

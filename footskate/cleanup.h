@@ -3,7 +3,7 @@
 // After kovar 2002 ("Footskate Cleanup for Motion Capture Editing") and yoo2019, section 6.3:
 //   1. the contacts (footskate/contact_model.h), or those given;
 //   2. every plant gets one place (footskate/plants.h);
-//   3. the root path moves smoothly so that every planted leg reaches (footskate/root_path.h);
+//   3. the root path moves smoothly so that every planted leg reaches (footskate/detail/root_path.h);
 //   4. between plants a foot carries the change of both over, twice continuously differentiable, so that nothing pops,
 //      and is kept on or above the ground;
 //   5. two-bone inverse kinematics (footskate/two_bone_ik.h); feet keep their orientation in the world, but for the
@@ -18,7 +18,7 @@
 #include <string>
 #include <vector>
 
-#include "footskate/plants.h"
+#include "kinespace/footskate/plants.h"
 
 namespace kinespace {
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <limits>
 
-#include "footskate/contacts.h"
+#include "kinespace/footskate/contacts.h"
 
 namespace kinespace {
 namespace {

@@ -1,11 +1,11 @@
-#include "footskate/contact_labels.h"
+#include "kinespace/footskate/contact_labels.h"
 
 #include <algorithm>
 #include <charconv>
 
 #include <fmt/format.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

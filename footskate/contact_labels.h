@@ -12,8 +12,8 @@
 #include <string_view>
 #include <vector>
 
-#include "footskate/contact_model.h"
-#include "storage/library.h"
+#include "kinespace/footskate/contact_model.h"
+#include "kinespace/storage/library.h"
 
 namespace kinespace {
 

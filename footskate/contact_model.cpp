@@ -1,4 +1,4 @@
-#include "footskate/contact_model.h"
+#include "kinespace/footskate/contact_model.h"
 
 #include <algorithm>
 #include <array>

@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "base/bytes.h"
-#include "footskate/contacts.h"
-#include "footskate/keyframes.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/footskate/contacts.h"
+#include "kinespace/footskate/keyframes.h"
 
 namespace kinespace {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "base/bytes.h"
-#include "footskate/contact_model.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/footskate/contact_model.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "footskate/contacts.h"
+#include "kinespace/footskate/contacts.h"
 
 #include <algorithm>
 #include <cmath>

@@ -10,8 +10,8 @@
 
 #include <vector>
 
-#include "footskate/foot_tracks.h"
-#include "footskate/ground.h"
+#include "kinespace/footskate/foot_tracks.h"
+#include "kinespace/footskate/ground.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "footskate/feet.h"
+#include "kinespace/footskate/feet.h"
 
 #include <algorithm>
 #include <cctype>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "motion/kinematics.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

@@ -12,7 +12,7 @@
 #include <optional>
 #include <string>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -1,11 +1,11 @@
-#include "footskate/foot_tracks.h"
+#include "kinespace/footskate/foot_tracks.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
-#include "motion/position_blocks.h"
+#include "kinespace/motion/position_blocks.h"
 
 namespace kinespace {
 namespace {

@@ -6,8 +6,8 @@
 
 #include <Eigen/Core>
 
-#include "footskate/feet.h"
-#include "motion/kinematics.h"
+#include "kinespace/footskate/feet.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "footskate/ground.h"
+#include "kinespace/footskate/ground.h"
 
 #include <algorithm>
 #include <cmath>

@@ -20,7 +20,7 @@
 
 #include <Eigen/Core>
 
-#include "footskate/foot_tracks.h"
+#include "kinespace/footskate/foot_tracks.h"
 
 namespace kinespace {
 

@@ -1,9 +1,9 @@
-#include "footskate/keyframes.h"
+#include "kinespace/footskate/keyframes.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "footskate/contacts.h"
+#include "kinespace/footskate/contacts.h"
 
 namespace kinespace {
 namespace {

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "footskate/ground.h"
+#include "kinespace/footskate/ground.h"
 
 namespace kinespace {
 

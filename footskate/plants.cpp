@@ -1,4 +1,4 @@
-#include "footskate/plants.h"
+#include "kinespace/footskate/plants.h"
 
 #include <algorithm>
 #include <array>

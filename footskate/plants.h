@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 
-#include "footskate/contacts.h"
+#include "kinespace/footskate/contacts.h"
 
 namespace kinespace {
 

@@ -1,11 +1,11 @@
-#include "footskate/skate_measures.h"
+#include "kinespace/footskate/skate_measures.h"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 
-#include "footskate/contact_model.h"
-#include "motion/position_blocks.h"
+#include "kinespace/footskate/contact_model.h"
+#include "kinespace/motion/position_blocks.h"
 
 namespace kinespace {
 

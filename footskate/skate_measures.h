@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "footskate/contacts.h"
+#include "kinespace/footskate/contacts.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "footskate/two_bone_ik.h"
+#include "kinespace/footskate/two_bone_ik.h"
 
 #include <algorithm>
 #include <cassert>

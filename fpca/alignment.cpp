@@ -1,4 +1,4 @@
-#include "fpca/alignment.h"
+#include "kinespace/fpca/alignment.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <Eigen/QR>
 #include <fmt/format.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

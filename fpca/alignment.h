@@ -18,10 +18,10 @@
 
 #include <Eigen/Core>
 
-#include "fpca/encoding.h"
-#include "fpca/motion_space.h"
-#include "fpca/warp.h"
-#include "kernels/dtw.h"
+#include "kinespace/fpca/encoding.h"
+#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/warp.h"
+#include "kinespace/kernels/dtw.h"
 
 namespace kinespace {
 

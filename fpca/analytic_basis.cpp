@@ -1,10 +1,10 @@
-#include "fpca/analytic_basis.h"
+#include "kinespace/fpca/analytic_basis.h"
 
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -8,8 +8,8 @@
 
 #include <cstdint>
 
-#include "fpca/curve_moments.h"
-#include "fpca/functional_pca.h"
+#include "kinespace/fpca/curve_moments.h"
+#include "kinespace/fpca/functional_pca.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "fpca/clip_space.h"
+#include "kinespace/fpca/clip_space.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "storage/bitstream.h"
+#include "kinespace/base/error.h"
+#include "kinespace/storage/bitstream.h"
 
 namespace kinespace {
 namespace {

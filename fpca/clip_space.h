@@ -12,8 +12,8 @@
 #include <span>
 #include <vector>
 
-#include "fpca/motion_space.h"
-#include "fpca/space_builder.h"
+#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/space_builder.h"
 
 namespace kinespace {
 

@@ -1,13 +1,13 @@
-#include "fpca/conditional_scores.h"
+#include "kinespace/fpca/conditional_scores.h"
 
 #include <algorithm>
 #include <armadillo>
 #include <cmath>
 #include <limits>
 
-#include "base/error.h"
-#include "fpca/blas.h"
-#include "kernels/blas_call.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/detail/blas.h"
+#include "kinespace/kernels/blas_call.h"
 
 namespace kinespace {
 

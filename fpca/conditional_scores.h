@@ -9,7 +9,7 @@
 
 #include <Eigen/Core>
 
-#include "fpca/curve_moments.h"
+#include "kinespace/fpca/curve_moments.h"
 
 namespace kinespace {
 

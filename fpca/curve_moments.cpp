@@ -1,11 +1,11 @@
-#include "fpca/curve_moments.h"
+#include "kinespace/fpca/curve_moments.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "base/error.h"
-#include "fpca/blas.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/detail/blas.h"
 
 namespace kinespace {
 namespace {

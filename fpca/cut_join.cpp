@@ -1,4 +1,4 @@
-#include "fpca/cut_join.h"
+#include "kinespace/fpca/cut_join.h"
 
 namespace kinespace {
 namespace {

@@ -4,7 +4,7 @@
 // and minus the second; both fade within `blend` of a sequence. Shared by decoding whole clips and by playback.
 #pragma once
 
-#include "fpca/uniform_spline.h"
+#include "kinespace/motion/uniform_spline.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "fpca/encoding.h"
+#include "kinespace/fpca/encoding.h"
 
 #include <algorithm>
 #include <cassert>
@@ -6,8 +6,8 @@
 #include <numbers>
 #include <utility>
 
-#include "base/error.h"
-#include "fpca/cut_join.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/cut_join.h"
 
 namespace kinespace {
 namespace {

@@ -12,11 +12,11 @@
 
 #include <Eigen/Core>
 
-#include "fpca/curves.h"
-#include "fpca/motion_space.h"
-#include "fpca/sequences.h"
-#include "fpca/warp.h"
-#include "storage/bitstream.h"
+#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/sequences.h"
+#include "kinespace/fpca/warp.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/storage/bitstream.h"
 
 namespace kinespace {
 

@@ -1,10 +1,10 @@
-#include "fpca/functional_pca.h"
+#include "kinespace/fpca/functional_pca.h"
 
 #include <cmath>
 #include <string>
 
-#include "base/error.h"
-#include "fpca/blas.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/detail/blas.h"
 
 namespace kinespace {
 namespace {

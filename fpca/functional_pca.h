@@ -30,8 +30,8 @@
 
 #include <Eigen/Core>
 
-#include "fpca/curve_moments.h"
-#include "kernels/local_linear.h"
+#include "kinespace/fpca/curve_moments.h"
+#include "kinespace/kernels/local_linear.h"
 
 namespace kinespace {
 

@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "base/error.h"
-#include "fpca/conditional_scores.h"
-#include "fpca/functional_pca.h"
-#include "fpca/spline.h"
-#include "fpca/symmetric_eigen.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/conditional_scores.h"
+#include "kinespace/fpca/detail/spline.h"
+#include "kinespace/fpca/functional_pca.h"
+#include "kinespace/fpca/symmetric_eigen.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "fpca/motion_space.h"
+#include "kinespace/fpca/motion_space.h"
 
 #include <algorithm>
 #include <cassert>
@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "kernels/covariance.h"
-#include "kernels/projection.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/covariance.h"
+#include "kinespace/kernels/projection.h"
 
 namespace kinespace {
 namespace {

@@ -18,11 +18,11 @@
 
 #include <Eigen/Core>
 
-#include "fpca/curve_moments.h"
-#include "fpca/curves.h"
-#include "fpca/functional_pca.h"
-#include "fpca/uniform_spline.h"
-#include "kernels/device.h"
+#include "kinespace/fpca/curve_moments.h"
+#include "kinespace/fpca/functional_pca.h"
+#include "kinespace/kernels/device.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/motion/uniform_spline.h"
 
 namespace kinespace {
 
@@ -45,7 +45,7 @@ struct MotionSpaceOptions {
 };
 
 class MotionSpace;
-// fpca/space_codec.h
+// library/detail/space_codec.h
 [[nodiscard]] Bytes pack_space(const MotionSpace& space);
 [[nodiscard]] MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& source);
 

@@ -1,4 +1,4 @@
-#include "fpca/pose_features.h"
+#include "kinespace/fpca/pose_features.h"
 
 #include <algorithm>
 #include <cmath>

@@ -13,7 +13,7 @@
 
 #include <vector>
 
-#include "fpca/curves.h"
+#include "kinespace/motion/curves.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "fpca/sequences.h"
+#include "kinespace/fpca/sequences.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "motion/kinematics.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

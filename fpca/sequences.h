@@ -14,7 +14,7 @@
 
 #include <vector>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

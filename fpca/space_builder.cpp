@@ -1,4 +1,4 @@
-#include "fpca/space_builder.h"
+#include "kinespace/fpca/space_builder.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "fpca/pose_features.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/pose_features.h"
 
 namespace kinespace {
 namespace {

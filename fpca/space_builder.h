@@ -8,11 +8,11 @@
 #include <optional>
 #include <vector>
 
-#include "base/progress.h"
-#include "fpca/alignment.h"
-#include "fpca/encoding.h"
-#include "fpca/motion_space.h"
-#include "fpca/sequences.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/fpca/alignment.h"
+#include "kinespace/fpca/encoding.h"
+#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/sequences.h"
 
 namespace kinespace {
 

@@ -1,12 +1,12 @@
-#include "fpca/symmetric_eigen.h"
+#include "kinespace/fpca/symmetric_eigen.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "base/error.h"
-#include "fpca/blas.h"
-#include "kernels/blas_call.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/detail/blas.h"
+#include "kinespace/kernels/blas_call.h"
 
 extern "C" {
 void dsytrd_(const char* uplo, const int* n, double* a, const int* lda, double* d, double* e, double* tau, double* work,

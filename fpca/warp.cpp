@@ -1,4 +1,4 @@
-#include "fpca/warp.h"
+#include "kinespace/fpca/warp.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include <Eigen/Dense>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "gltf/accessors.h"
+#include "kinespace/gltf/accessors.h"
 
 #include <algorithm>
 #include <cstring>
@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace::gltf {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "gltf/budget.h"
-#include "gltf/document.h"
+#include "kinespace/gltf/budget.h"
+#include "kinespace/gltf/document.h"
 
 namespace kinespace::gltf {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include "gltf/tiny.h"
+#include "kinespace/gltf/tiny.h"
 
 namespace kinespace {
 

@@ -1,8 +1,8 @@
-#include "gltf/budget.h"
+#include "kinespace/gltf/budget.h"
 
 #include <fmt/format.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace::gltf {
 

@@ -1,16 +1,16 @@
-#include "gltf/document.h"
+#include "kinespace/gltf/document.h"
 
 #include <algorithm>
 #include <bit>
 #include <cstring>
 
-#include "gltf/buffers.h"
-#include "gltf/fields.h"
-#include "gltf/json_shape.h"
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
+#include "kinespace/gltf/detail/buffers.h"
+#include "kinespace/gltf/detail/fields.h"
+#include "kinespace/gltf/detail/json_shape.h"
 
 namespace kinespace::gltf {
 namespace {

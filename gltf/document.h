@@ -11,9 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "gltf/budget.h"
-
-#include "base/progress.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/gltf/budget.h"
 
 namespace kinespace::gltf {
 
@@ -106,7 +105,7 @@ struct Document {
 // it is KHR_mesh_quantization.
 [[nodiscard]] bool is_harmless_extension(std::string_view name);
 
-// Reads a .gltf or .glb file, whichever the bytes are; buffers beside `file` as gltf/buffers.h has it. In this order:
+// Reads a .gltf or .glb file, whichever the bytes are; buffers beside `file` as gltf/detail/buffers.h has it. In this order:
 // the JSON's depth and size, the extensions that it requires, the rest. Throws Error{bad_input}; Interrupted when
 // `progress` says so.
 [[nodiscard]] Document read_document(std::string_view bytes, const std::filesystem::path& file, Budget& budget,

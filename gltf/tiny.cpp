@@ -2,4 +2,4 @@
 #include <fstream>
 
 #define TINYGLTF_IMPLEMENTATION
-#include "gltf/tiny.h"
+#include "kinespace/gltf/tiny.h"

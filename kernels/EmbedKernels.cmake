@@ -17,13 +17,15 @@ const char* const ${NAME} = R\"opencl(${source})opencl\";
   return()
 endif()
 
-# kinespace_embed_kernels(VARIABLE x ...): the list of generated sources.
+# kinespace_embed_kernels(VARIABLE): the list of generated sources, one for each .cl of the folder but for the tiles, which others include.
 set(KINESPACE_EMBED_SCRIPT "${CMAKE_CURRENT_LIST_FILE}")
 function(kinespace_embed_kernels variable)
   set(outputs "")
   set(common "${CMAKE_CURRENT_SOURCE_DIR}/matrix_tile.cl")  # what kernels include
-  foreach(name ${ARGN})
-    set(input "${CMAKE_CURRENT_SOURCE_DIR}/${name}.cl")
+  file(GLOB inputs CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/*.cl")
+  list(FILTER inputs EXCLUDE REGEX "_tile\\.cl$")
+  foreach(input IN LISTS inputs)
+    get_filename_component(name "${input}" NAME_WE)
     set(output "${CMAKE_CURRENT_BINARY_DIR}/${name}_cl.cpp")
     add_custom_command(
       OUTPUT "${output}"

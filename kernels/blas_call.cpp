@@ -1,4 +1,4 @@
-#include "kernels/blas_call.h"
+#include "kinespace/kernels/blas_call.h"
 
 #include <cstddef>
 #include <mutex>
@@ -8,7 +8,7 @@
 #include <sys/mman.h>
 #include <sys/resource.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

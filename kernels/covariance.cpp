@@ -1,4 +1,4 @@
-#include "kernels/covariance.h"
+#include "kinespace/kernels/covariance.h"
 
 #include <algorithm>
 #include <array>
@@ -10,10 +10,10 @@
 #include <cblas.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "kernels/blas_call.h"
-#include "kernels/covariance_detail.h"
-#include "kernels/simd.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/blas_call.h"
+#include "kinespace/kernels/detail/covariance.h"
+#include "kinespace/kernels/simd.h"
 
 namespace kinespace {
 namespace {

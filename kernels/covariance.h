@@ -16,8 +16,8 @@
 #include <cstdint>
 #include <memory>
 
-#include "kernels/device.h"
-#include "kernels/matrix.h"
+#include "kinespace/kernels/device.h"
+#include "kinespace/kernels/matrix.h"
 
 namespace kinespace {
 

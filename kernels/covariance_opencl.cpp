@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include "kernels/covariance_detail.h"
-#include "kernels/matrix_opencl.h"
+#include "kinespace/kernels/detail/covariance.h"
+#include "kinespace/kernels/detail/matrix_opencl.h"
 
 namespace kinespace::covariance_detail {
 

@@ -2,12 +2,12 @@
 #include <cmath>
 #include <random>
 
-#include "kernels/covariance.h"
-#include "kernels/dtw.h"
-#include "kernels/kernel_descriptor.h"
-#include "kernels/keyframe_distance.h"
-#include "kernels/local_linear.h"
-#include "kernels/projection.h"
+#include "kinespace/kernels/covariance.h"
+#include "kinespace/kernels/dtw.h"
+#include "kinespace/kernels/kernel_descriptor.h"
+#include "kinespace/kernels/keyframe_distance.h"
+#include "kinespace/kernels/local_linear.h"
+#include "kinespace/kernels/projection.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 
 #include <algorithm>
 #include <array>
@@ -11,8 +11,8 @@
 
 #include <cblas.h>
 
-#include "base/error.h"
-#include "kernels/opencl.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/detail/opencl.h"
 
 namespace kinespace {
 namespace {

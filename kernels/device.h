@@ -42,7 +42,7 @@ enum class KernelVariant { by_device, lanes, groups };
 // The kernels, for the sizes at which "auto" goes to OpenCL.
 enum class KernelFamily { keyframe_distances, dtw, covariance, projection, local_linear };
 
-class OpenClDevice;  // kernels/opencl.h, internal
+class OpenClDevice;  // kernels/detail/opencl.h, internal
 
 class Compute {
  public:

@@ -1,10 +1,10 @@
-#include "kernels/dtw.h"
+#include "kinespace/kernels/dtw.h"
 
 #include <cmath>
 #include <string>
 
-#include "base/error.h"
-#include "kernels/dtw_detail.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/detail/dtw.h"
 
 namespace kinespace {
 namespace {

@@ -28,7 +28,7 @@
 #include <span>
 #include <vector>
 
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 
 namespace kinespace {
 

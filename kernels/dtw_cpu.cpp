@@ -6,8 +6,8 @@
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "kernels/dtw_detail.h"
-#include "kernels/simd.h"
+#include "kinespace/kernels/detail/dtw.h"
+#include "kinespace/kernels/simd.h"
 
 namespace kinespace::dtw_detail {
 namespace {

@@ -1,4 +1,4 @@
-#include "kernels/dtw_opencl.h"
+#include "kinespace/kernels/detail/dtw_opencl.h"
 
 #include <algorithm>
 

@@ -1,7 +1,7 @@
 // The host side of dtw_groups.cl: one work-group a pair.
 #include <oneapi/tbb/parallel_for.h>
 
-#include "kernels/dtw_opencl.h"
+#include "kinespace/kernels/detail/dtw_opencl.h"
 
 namespace kinespace::dtw_detail {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
-#include "kernels/dtw_opencl.h"
+#include "kinespace/kernels/detail/dtw_opencl.h"
 
 namespace kinespace::dtw_detail {
 namespace {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "kernels/dtw_detail.h"
+#include "kinespace/kernels/detail/dtw.h"
 
 namespace kinespace::reference {
 namespace {

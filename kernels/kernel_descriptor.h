@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "kernels/keyframe_distance.h"
+#include "kinespace/kernels/keyframe_distance.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +7,9 @@
 #include <cblas.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "kernels/blas_call.h"
-#include "kernels/keyframe_distance_detail.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/blas_call.h"
+#include "kinespace/kernels/detail/keyframe_distance.h"
 
 namespace kinespace {
 namespace {

@@ -12,8 +12,8 @@
 
 #include <cstdint>
 
-#include "kernels/device.h"
-#include "kernels/matrix.h"
+#include "kinespace/kernels/device.h"
+#include "kinespace/kernels/matrix.h"
 
 namespace kinespace {
 

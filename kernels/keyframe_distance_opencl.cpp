@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include "kernels/keyframe_distance_detail.h"
-#include "kernels/matrix_opencl.h"
+#include "kinespace/kernels/detail/keyframe_distance.h"
+#include "kinespace/kernels/detail/matrix_opencl.h"
 
 namespace kinespace::keyframe_detail {
 

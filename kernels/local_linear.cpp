@@ -1,11 +1,11 @@
-#include "kernels/local_linear.h"
+#include "kinespace/kernels/local_linear.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -16,7 +16,7 @@
 
 #include <Eigen/Core>
 
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 
 namespace kinespace {
 

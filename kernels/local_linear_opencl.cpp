@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "kernels/local_linear.h"
-#include "kernels/matrix_opencl.h"
+#include "kinespace/kernels/detail/matrix_opencl.h"
+#include "kinespace/kernels/local_linear.h"
 
 namespace kinespace {
 namespace {

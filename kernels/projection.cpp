@@ -1,4 +1,4 @@
-#include "kernels/projection.h"
+#include "kinespace/kernels/projection.h"
 
 #include <algorithm>
 #include <string>
@@ -7,9 +7,9 @@
 #include <cblas.h>
 #include <oneapi/tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "kernels/blas_call.h"
-#include "kernels/projection_detail.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/blas_call.h"
+#include "kinespace/kernels/detail/projection.h"
 
 namespace kinespace {
 namespace {

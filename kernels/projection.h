@@ -7,8 +7,8 @@
 // largest product |y - mean| |p|. The result does not depend on threads.
 #pragma once
 
-#include "kernels/device.h"
-#include "kernels/matrix.h"
+#include "kinespace/kernels/device.h"
+#include "kinespace/kernels/matrix.h"
 
 namespace kinespace {
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 
-#include "kernels/matrix_opencl.h"
-#include "kernels/projection_detail.h"
+#include "kinespace/kernels/detail/matrix_opencl.h"
+#include "kinespace/kernels/detail/projection.h"
 
 namespace kinespace::projection_detail {
 

@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/rigid.h"
-#include "motion/simd.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/rigid.h"
+#include "kinespace/motion/simd.h"
 
 namespace kinespace {
 namespace {

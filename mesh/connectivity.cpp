@@ -1,4 +1,4 @@
-#include "mesh/connectivity.h"
+#include "kinespace/mesh/connectivity.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "mesh/decimation.h"
+#include "kinespace/mesh/decimation.h"
 
 #include <algorithm>
 #include <limits>
@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <meshoptimizer.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

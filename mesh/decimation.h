@@ -19,8 +19,8 @@
 
 #include <Eigen/Core>
 
-#include "mesh/connectivity.h"
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/connectivity.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

@@ -1,12 +1,12 @@
-#include "mesh/deformation.h"
+#include "kinespace/mesh/deformation.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <Eigen/Geometry>
 
-#include "mesh/laplacian.h"
-#include "mesh/rotation_fit.h"
+#include "kinespace/mesh/detail/rotation_fit.h"
+#include "kinespace/mesh/laplacian.h"
 
 namespace kinespace {
 namespace {

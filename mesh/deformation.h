@@ -27,10 +27,10 @@
 
 #include <Eigen/Core>
 
-#include "mesh/connectivity.h"
-#include "mesh/mesh_sequence.h"
-#include "mesh/projection.h"
-#include "mesh/sparse_solver.h"
+#include "kinespace/mesh/connectivity.h"
+#include "kinespace/mesh/mesh_sequence.h"
+#include "kinespace/mesh/projection.h"
+#include "kinespace/mesh/sparse_solver.h"
 
 namespace kinespace {
 

@@ -2,14 +2,14 @@
 #include <cmath>
 #include <limits>
 
-#include "gltf/accessors.h"
-#include "gltf/document.h"
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/gltf_animation.h"
-#include "mesh/mesh_formats.h"
+#include "kinespace/base/error.h"
+#include "kinespace/gltf/accessors.h"
+#include "kinespace/gltf/document.h"
+#include "kinespace/mesh/detail/gltf_animation.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
 
 namespace kinespace {
 namespace {

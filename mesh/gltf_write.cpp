@@ -2,12 +2,12 @@
 #include <cstring>
 #include <sstream>
 
-#include "gltf/arrays.h"
-#include "gltf/tiny.h"
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/mesh_formats.h"
+#include "kinespace/base/error.h"
+#include "kinespace/gltf/arrays.h"
+#include "kinespace/gltf/tiny.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
 
 namespace kinespace {
 namespace {

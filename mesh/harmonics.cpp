@@ -1,4 +1,4 @@
-#include "mesh/harmonics.h"
+#include "kinespace/mesh/harmonics.h"
 
 #include <algorithm>
 #include <array>
@@ -8,11 +8,11 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "mesh/connectivity.h"
-#include "mesh/eigenpairs.h"
-#include "mesh/laplacian.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/mesh/connectivity.h"
+#include "kinespace/mesh/detail/eigenpairs.h"
+#include "kinespace/mesh/laplacian.h"
 
 namespace kinespace {
 namespace {

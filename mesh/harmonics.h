@@ -6,7 +6,7 @@
 // The functions are M-orthonormal: U' M U = I. Coefficients of positions are therefore U' M f (not U' f, as the paper
 // prints); the least-squares ones, which minimise the KG error, are those of mesh/projection.h.
 //
-// How: mesh/eigenpairs.h, component by component (Spectra, in bands): 400 functions on 8431 vertices take a second.
+// How: mesh/detail/eigenpairs.h, component by component (Spectra, in bands): 400 functions on 8431 vertices take a second.
 // The same build gives the same bits on every run and with any number of threads. Another build, compiler or processor
 // may not: nearly equal eigenvalues rotate their vectors, and signs flip. The sign is made canonical (the component of
 // largest size is positive, the first such within 1e-6 of it), which helps against flips only. So a stream that relies
@@ -19,7 +19,7 @@
 
 #include <Eigen/Core>
 
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

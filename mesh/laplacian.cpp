@@ -1,4 +1,4 @@
-#include "mesh/laplacian.h"
+#include "kinespace/mesh/laplacian.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include "mesh/connectivity.h"
+#include "kinespace/mesh/connectivity.h"
 
 namespace kinespace {
 namespace {

@@ -23,7 +23,7 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "mesh/mesh_error.h"
+#include "kinespace/mesh/mesh_error.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/connectivity.h"
-#include "mesh/rotation_fit.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/connectivity.h"
+#include "kinespace/mesh/detail/rotation_fit.h"
 
 namespace kinespace {
 namespace {

@@ -14,7 +14,7 @@
 #include <span>
 #include <vector>
 
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

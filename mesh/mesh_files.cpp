@@ -1,4 +1,4 @@
-#include "mesh/mesh_files.h"
+#include "kinespace/mesh/mesh_files.h"
 
 #include <algorithm>
 #include <array>
@@ -10,10 +10,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "mesh/mesh_formats.h"
-#include "motion/text.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

@@ -9,7 +9,7 @@
 //   glTF   .gltf or .glb, baked: nodes, skins and morph targets of the first animation (or the rest pose, one frame)
 //          for every node with triangles in the file, at `rate_hz`; where all samplers share evenly spaced times, at
 //          those. Written as one mesh with a morph target a frame. Buffers in the file or in files of its folder
-//          (gltf/buffers.h); pictures are not looked at. Not read: files that require Draco, meshopt or another
+//          (gltf/detail/buffers.h); pictures are not looked at. Not read: files that require Draco, meshopt or another
 //          extension that changes shapes.
 //
 // The rate of what does not tell one is MeshSequence::usual_rate_hz. Every frame must have the vertices and triangles
@@ -21,8 +21,8 @@
 #include <filesystem>
 #include <optional>
 
-#include "base/progress.h"
-#include "mesh/mesh_sequence.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

@@ -1,11 +1,11 @@
-#include "mesh/mesh_report.h"
+#include "kinespace/mesh/mesh_report.h"
 
 #include <algorithm>
 #include <vector>
 
 #include <Eigen/Geometry>
 
-#include "mesh/connectivity.h"
+#include "kinespace/mesh/connectivity.h"
 
 namespace kinespace {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <cstdint>
 
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

@@ -1,11 +1,11 @@
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

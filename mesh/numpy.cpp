@@ -6,8 +6,8 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/mesh_formats.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
 
 namespace kinespace {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "mesh/mesh_formats.h"
-#include "motion/text.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "mesh/picture.h"
+#include "kinespace/mesh/picture.h"
 
 #include <algorithm>
 #include <array>
@@ -9,8 +9,8 @@
 #include <Eigen/Geometry>
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/mesh_error.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/mesh_error.h"
 
 namespace kinespace {
 namespace {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/mesh_formats.h"
-#include "motion/text.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

@@ -1,8 +1,8 @@
 #include <png.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "mesh/picture.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/mesh/picture.h"
 
 namespace kinespace {
 

@@ -1,11 +1,11 @@
-#include "mesh/projection.h"
+#include "kinespace/mesh/projection.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <Eigen/QR>
 
-#include "motion/simd.h"
+#include "kinespace/motion/simd.h"
 
 namespace kinespace {
 namespace {

@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/decimation.h"
-#include "mesh/deformation.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/decimation.h"
+#include "kinespace/mesh/deformation.h"
 
 namespace kinespace {
 namespace {

@@ -1,8 +1,8 @@
-#include "mesh/rigid.h"
+#include "kinespace/mesh/rigid.h"
 
 #include <cmath>
 
-#include "mesh/rotation_fit.h"
+#include "kinespace/mesh/detail/rotation_fit.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "mesh/smooth_basis.h"
+#include "kinespace/mesh/smooth_basis.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,12 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "mesh/connectivity.h"
-#include "mesh/dense_kernels.h"
-#include "mesh/laplacian.h"
-#include "mesh/sparse_solver.h"
-#include "motion/simd.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/connectivity.h"
+#include "kinespace/mesh/detail/dense_kernels.h"
+#include "kinespace/mesh/laplacian.h"
+#include "kinespace/mesh/sparse_solver.h"
+#include "kinespace/motion/simd.h"
 
 namespace kinespace {
 namespace {

@@ -21,7 +21,7 @@
 
 #include <Eigen/Core>
 
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {
 

@@ -1,12 +1,12 @@
-#include "mesh/sparse_solver.h"
+#include "kinespace/mesh/sparse_solver.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <Eigen/SparseCholesky>
 
-#include "base/error.h"
-#include "motion/simd.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/simd.h"
 
 namespace kinespace {
 namespace {

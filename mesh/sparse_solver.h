@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "mesh/laplacian.h"
+#include "kinespace/mesh/laplacian.h"
 
 namespace kinespace {
 

@@ -13,8 +13,8 @@
 #include <string>
 #include <string_view>
 
-#include "motion/asf.h"
-#include "motion/clip.h"
+#include "kinespace/motion/asf.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include "base/file.h"
-#include "motion/amc.h"
-#include "motion/euler.h"
-#include "motion/motion_builder.h"
-#include "motion/text.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/detail/motion_builder.h"
+#include "kinespace/motion/euler.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

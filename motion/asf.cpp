@@ -1,4 +1,4 @@
-#include "motion/asf.h"
+#include "kinespace/motion/asf.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 #include <unordered_map>
 #include <utility>
 
-#include "base/file.h"
-#include "motion/text.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

@@ -31,7 +31,7 @@
 
 #include <Eigen/Geometry>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -22,7 +22,7 @@
 #include <string>
 #include <string_view>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -3,12 +3,12 @@
 #include <string>
 #include <vector>
 
-#include "base/file.h"
-#include "motion/bvh.h"
-#include "motion/bvh_hierarchy.h"
-#include "motion/euler.h"
-#include "motion/motion_builder.h"
-#include "motion/text.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/detail/bvh_hierarchy.h"
+#include "kinespace/motion/detail/motion_builder.h"
+#include "kinespace/motion/euler.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

@@ -11,7 +11,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "motion/skeleton.h"
+#include "kinespace/motion/skeleton.h"
 
 namespace kinespace {
 

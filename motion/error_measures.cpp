@@ -1,4 +1,4 @@
-#include "motion/error_measures.h"
+#include "kinespace/motion/error_measures.h"
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "base/error.h"
-#include "motion/euler.h"
-#include "motion/kinematics.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/euler.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

@@ -1,7 +1,7 @@
 // How far one clip is from another: the measures every codec and every level of detail is judged by.
 #pragma once
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "motion/euler.h"
+#include "kinespace/motion/euler.h"
 
 #include <algorithm>
 #include <bit>
@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <numbers>
 
-#include "motion/simd.h"
+#include "kinespace/motion/simd.h"
 
 namespace kinespace {
 namespace {

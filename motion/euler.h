@@ -19,7 +19,7 @@
 
 #include <Eigen/Geometry>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "motion/gltf.h"
+#include "kinespace/motion/gltf.h"
 
 #include <algorithm>
 #include <array>
@@ -11,14 +11,13 @@
 #include <utility>
 #include <vector>
 
-#include "gltf/arrays.h"
-#include "gltf/tiny.h"
-
-#include "base/error.h"
-#include "base/file.h"
-#include "base/printable.h"
-#include "motion/motion_builder.h"
-#include "motion/text.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/base/printable.h"
+#include "kinespace/gltf/arrays.h"
+#include "kinespace/gltf/tiny.h"
+#include "kinespace/motion/detail/motion_builder.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

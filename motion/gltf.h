@@ -15,7 +15,7 @@
 #include <filesystem>
 #include <string>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -1,10 +1,10 @@
-#include "motion/kinematics.h"
+#include "kinespace/motion/kinematics.h"
 
 #include <algorithm>
 #include <array>
 
-#include "motion/position_blocks.h"
-#include "motion/simd.h"
+#include "kinespace/motion/position_blocks.h"
+#include "kinespace/motion/simd.h"
 
 namespace kinespace {
 namespace {

@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "motion/plausibility.h"
+#include "kinespace/motion/plausibility.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "motion/kinematics.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

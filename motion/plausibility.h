@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "motion/kinematics.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 

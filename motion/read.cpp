@@ -1,4 +1,4 @@
-#include "motion/read.h"
+#include "kinespace/motion/read.h"
 
 #include <algorithm>
 #include <string>
@@ -6,11 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "base/error.h"
-#include "motion/amc.h"
-#include "motion/bvh.h"
-#include "motion/gltf.h"
-#include "motion/text.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/gltf.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

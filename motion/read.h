@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -1,10 +1,10 @@
-#include "motion/skeleton.h"
+#include "kinespace/motion/skeleton.h"
 
 #include <algorithm>
 #include <span>
 
-#include "base/bytes.h"
-#include "base/file.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/base/file.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "motion/strip.h"
+#include "kinespace/motion/strip.h"
 
 #include <algorithm>
 #include <array>
@@ -9,11 +9,11 @@
 #include <string_view>
 #include <utility>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "motion/kinematics.h"
-#include "motion/strip_body.h"
-#include "motion/strip_svg.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/detail/strip_body.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/strip_svg.h"
 
 namespace kinespace {
 namespace {

@@ -17,7 +17,7 @@
 
 #include <Eigen/Core>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

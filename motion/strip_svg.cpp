@@ -1,11 +1,11 @@
-#include "motion/strip_svg.h"
+#include "kinespace/motion/strip_svg.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <utility>
 
-#include "motion/text.h"
+#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {

@@ -15,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-#include "base/file.h"
+#include "kinespace/base/file.h"
 
 namespace kinespace {
 

@@ -2,7 +2,7 @@
 // its own (.ksm) and in the blobs of a library.
 //
 //   magic            4 bytes   8b 4b 53 42
-//   format version   varint    storage/bitstream_version.h
+//   format version   varint    storage/detail/bitstream_version.h
 //   header length    varint
 //   header                     kind; flags; the measured errors as floats; options, by key; the table of sections
 //   checksum         8 bytes   XXH3-64 of all of the above
@@ -28,7 +28,7 @@
 #include <string_view>
 #include <vector>
 
-#include "base/bytes.h"
+#include "kinespace/base/bytes.h"
 
 namespace kinespace {
 

@@ -6,12 +6,12 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "storage/bitstream.h"
-#include "storage/bitstream_format.h"
-#include "storage/bitstream_version.h"
-#include "storage/varint.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/storage/bitstream.h"
+#include "kinespace/storage/detail/bitstream_format.h"
+#include "kinespace/storage/detail/bitstream_version.h"
+#include "kinespace/storage/varint.h"
 
 namespace kinespace {
 namespace format = bitstream_format;

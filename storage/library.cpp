@@ -1,14 +1,14 @@
-#include "storage/library.h"
+#include "kinespace/storage/library.h"
 
 #include <charconv>
 #include <cmath>
 #include <system_error>
 #include <utility>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "storage/library_schema.h"
-#include "storage/sqlite.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/storage/detail/library_schema.h"
+#include "kinespace/storage/detail/sqlite.h"
 
 namespace kinespace {
 namespace {

@@ -1,7 +1,7 @@
 // The library file (LIB.kspace): one SQLite database with skeletons, motion spaces, clips and what was computed for
 // them.
 //
-// Any SQLite tool can read it; storage/library_schema.cpp has the tables. A Library is a movable connection for one
+// Any SQLite tool can read it; storage/detail/library_schema.cpp has the tables. A Library is a movable connection for one
 // thread at a time; threads that read at once open one each.
 //
 // Errors, all of type Error and naming the file:
@@ -25,8 +25,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/bytes.h"
-#include "storage/library_rows.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/storage/library_rows.h"
 
 namespace kinespace {
 

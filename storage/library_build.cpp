@@ -1,4 +1,4 @@
-#include "storage/library_build.h"
+#include "kinespace/storage/library_build.h"
 
 #include <array>
 #include <chrono>
@@ -6,11 +6,11 @@
 #include <mutex>
 #include <utility>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "storage/build_files.h"
-#include "storage/library_schema.h"
-#include "storage/sqlite.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/storage/detail/build_files.h"
+#include "kinespace/storage/detail/library_schema.h"
+#include "kinespace/storage/detail/sqlite.h"
 
 namespace kinespace {
 namespace {

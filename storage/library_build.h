@@ -36,8 +36,8 @@
 #include <string_view>
 #include <vector>
 
-#include "base/bytes.h"
-#include "storage/library.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/storage/library.h"
 
 namespace kinespace {
 

@@ -3,10 +3,10 @@
 #include <string>
 #include <utility>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "storage/library.h"
-#include "storage/sqlite.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/storage/detail/sqlite.h"
+#include "kinespace/storage/library.h"
 
 namespace kinespace {
 namespace {

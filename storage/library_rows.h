@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "base/bytes.h"
+#include "kinespace/base/bytes.h"
 
 namespace kinespace {
 

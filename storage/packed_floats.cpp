@@ -1,4 +1,4 @@
-#include "storage/packed_floats.h"
+#include "kinespace/storage/packed_floats.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 
 #include <zstd.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "base/bytes.h"
+#include "kinespace/base/bytes.h"
 
 namespace kinespace {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <string_view>
 
-#include "base/bytes.h"
+#include "kinespace/base/bytes.h"
 
 namespace kinespace {
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <limits>
 
-#include "synthesis/interpolation.h"
+#include "kinespace/synthesis/interpolation.h"
 
 namespace kinespace {
 namespace {

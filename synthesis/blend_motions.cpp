@@ -3,11 +3,11 @@
 #include <numbers>
 #include <vector>
 
-#include "base/error.h"
-#include "synthesis/curve_sampler.h"
-#include "synthesis/interpolation.h"
-#include "synthesis/side_track_blend.h"
-#include "synthesis/time_alignment.h"
+#include "kinespace/base/error.h"
+#include "kinespace/synthesis/curve_sampler.h"
+#include "kinespace/synthesis/detail/side_track_blend.h"
+#include "kinespace/synthesis/detail/time_alignment.h"
+#include "kinespace/synthesis/interpolation.h"
 
 namespace kinespace {
 namespace {

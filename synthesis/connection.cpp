@@ -1,4 +1,4 @@
-#include "synthesis/connection.h"
+#include "kinespace/synthesis/connection.h"
 
 #include <algorithm>
 #include <array>
@@ -8,10 +8,10 @@
 #include <Eigen/QR>
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "fpca/alignment.h"
-#include "motion/simd.h"
-#include "synthesis/connection_detail.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/alignment.h"
+#include "kinespace/motion/simd.h"
+#include "kinespace/synthesis/detail/connection.h"
 
 namespace kinespace {
 

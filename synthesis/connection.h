@@ -30,8 +30,8 @@
 
 #include <Eigen/Core>
 
-#include "fpca/motion_space.h"
-#include "synthesis/curve_sampler.h"
+#include "kinespace/fpca/motion_space.h"
+#include "kinespace/synthesis/curve_sampler.h"
 
 namespace kinespace {
 

@@ -6,8 +6,8 @@
 #include <Eigen/Eigenvalues>
 #include <tbb/parallel_for.h>
 
-#include "synthesis/connection.h"
-#include "synthesis/connection_detail.h"
+#include "kinespace/synthesis/connection.h"
+#include "kinespace/synthesis/detail/connection.h"
 
 namespace kinespace {
 namespace {

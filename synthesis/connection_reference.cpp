@@ -1,8 +1,8 @@
 #include <cmath>
 
-#include "fpca/uniform_spline.h"
-#include "synthesis/connection.h"
-#include "synthesis/connection_detail.h"
+#include "kinespace/motion/uniform_spline.h"
+#include "kinespace/synthesis/connection.h"
+#include "kinespace/synthesis/detail/connection.h"
 
 namespace kinespace::reference {
 

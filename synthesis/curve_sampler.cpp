@@ -1,4 +1,4 @@
-#include "synthesis/curve_sampler.h"
+#include "kinespace/synthesis/curve_sampler.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,13 +1,13 @@
 // The curves of a clip at any time, and what of them does not depend on where the clip stood and looked.
 //
-// Between frames the curves are cubic splines (fpca/uniform_spline.h); at a frame they are the frame. Times are seconds
+// Between frames the curves are cubic splines (motion/uniform_spline.h); at a frame they are the frame. Times are seconds
 // from the first frame, clamped to the clip.
 #pragma once
 
 #include <Eigen/Core>
 
-#include "fpca/curves.h"
-#include "fpca/uniform_spline.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/motion/uniform_spline.h"
 
 namespace kinespace {
 

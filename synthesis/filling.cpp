@@ -1,4 +1,4 @@
-#include "synthesis/filling.h"
+#include "kinespace/synthesis/filling.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "fpca/curves.h"
-#include "motion/kinematics.h"
-#include "synthesis/filling_core.h"
-#include "synthesis/filling_window.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/synthesis/detail/filling_core.h"
+#include "kinespace/synthesis/detail/filling_window.h"
 
 namespace kinespace {
 namespace {

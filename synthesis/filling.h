@@ -1,6 +1,6 @@
 // Missing frames, estimated from what is seen on both sides and from a library of motions, with how sure that is.
 //
-// Method. At 30 Hz a window is the gap with `context_s` on either side: all curves (fpca/curves.h) as one vector-valued
+// Method. At 30 Hz a window is the gap with `context_s` on either side: all curves (motion/curves.h) as one vector-valued
 // function, its heading and ground position taken from the frame before the gap. The library's windows whose seen part
 // is nearest (poses and their change over 0.1 s, frames at the gap first) are weighted by a Gauss kernel and give a
 // mean mu and principal components Phi, found by their Gram matrix: far fewer windows than dimensions. What these leave
@@ -30,11 +30,11 @@
 
 #include <Eigen/Core>
 
-#include "base/progress.h"
-#include "fpca/library_view.h"
-#include "fpca/space_builder.h"
-#include "motion/clip.h"
-#include "synthesis/filling_gap.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/fpca/space_builder.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/motion/clip.h"
+#include "kinespace/synthesis/filling_gap.h"
 
 namespace kinespace {
 

@@ -4,7 +4,7 @@
 
 #include <tbb/parallel_for.h>
 
-#include "synthesis/filling_core.h"
+#include "kinespace/synthesis/detail/filling_core.h"
 
 namespace kinespace {
 namespace {

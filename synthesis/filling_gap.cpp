@@ -1,11 +1,11 @@
-#include "synthesis/filling_gap.h"
+#include "kinespace/synthesis/filling_gap.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "synthesis/interpolation.h"
+#include "kinespace/synthesis/interpolation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,11 +7,11 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "motion/kinematics.h"
-#include "synthesis/curve_sampler.h"
-#include "synthesis/library_clips.h"
-#include "synthesis/time_alignment.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/synthesis/curve_sampler.h"
+#include "kinespace/synthesis/detail/library_clips.h"
+#include "kinespace/synthesis/detail/time_alignment.h"
 
 namespace kinespace {
 namespace {

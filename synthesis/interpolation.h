@@ -20,8 +20,8 @@
 
 #include <Eigen/Core>
 
-#include "fpca/library_view.h"
-#include "synthesis/seam.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/synthesis/seam.h"
 
 namespace kinespace {
 

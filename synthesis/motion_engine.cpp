@@ -1,4 +1,4 @@
-#include "synthesis/motion_engine.h"
+#include "kinespace/synthesis/motion_engine.h"
 
 namespace kinespace {
 

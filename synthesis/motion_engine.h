@@ -23,12 +23,12 @@
 #include <string>
 #include <vector>
 
-#include "fpca/library_view.h"
-#include "synthesis/filling.h"
-#include "synthesis/interpolation.h"
-#include "synthesis/player.h"
-#include "synthesis/retrieval.h"
-#include "synthesis/transition_plan.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/synthesis/filling.h"
+#include "kinespace/synthesis/interpolation.h"
+#include "kinespace/synthesis/player.h"
+#include "kinespace/synthesis/retrieval.h"
+#include "kinespace/synthesis/transition_plan.h"
 
 namespace kinespace {
 

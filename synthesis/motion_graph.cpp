@@ -1,4 +1,4 @@
-#include "synthesis/motion_graph.h"
+#include "kinespace/synthesis/motion_graph.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,11 +12,11 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "fpca/alignment.h"
-#include "synthesis/graph_bridges.h"
-#include "synthesis/graph_ways.h"
-#include "synthesis/interpolation.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/alignment.h"
+#include "kinespace/synthesis/detail/graph_bridges.h"
+#include "kinespace/synthesis/detail/graph_ways.h"
+#include "kinespace/synthesis/interpolation.h"
 
 namespace kinespace {
 namespace {

@@ -19,10 +19,10 @@
 #include <string>
 #include <vector>
 
-#include "base/bytes.h"
-#include "base/progress.h"
-#include "fpca/library_view.h"
-#include "synthesis/connection.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/synthesis/connection.h"
 
 namespace kinespace {
 

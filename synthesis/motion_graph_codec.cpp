@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "synthesis/motion_graph.h"
+#include "kinespace/synthesis/motion_graph.h"
 
 namespace kinespace {
 namespace {

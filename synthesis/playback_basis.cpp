@@ -1,4 +1,4 @@
-#include "synthesis/playback_basis.h"
+#include "kinespace/synthesis/playback_basis.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,7 +1,7 @@
 // The functions of a motion space as tables for playback: their values at any time, and the integrals that the root's
 // travel needs.
 //
-// Between two points of the space's grid a function is a cubic (fpca/uniform_spline.h), so a value is four numbers and
+// Between two points of the space's grid a function is a cubic (motion/uniform_spline.h), so a value is four numbers and
 // the place in the cell. Entry 0 is the mean function, entry k the k-th function. The root's travel is the integral of
 // the velocity v(s) over own time h(s), h'(s) = 1 + sum_j a_j cos(j pi s) (fpca/warp.h), which is linear in the
 // functions and in the a_j:
@@ -15,9 +15,9 @@
 #include <span>
 #include <vector>
 
-#include "base/aligned.h"
-#include "fpca/motion_space.h"
-#include "fpca/warp.h"
+#include "kinespace/base/aligned.h"
+#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/warp.h"
 
 namespace kinespace {
 

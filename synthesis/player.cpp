@@ -1,13 +1,13 @@
-#include "synthesis/player.h"
+#include "kinespace/synthesis/player.h"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <cstring>
 
-#include "fpca/cut_join.h"
-#include "kernels/simd.h"
-#include "synthesis/player_parts.h"
+#include "kinespace/fpca/cut_join.h"
+#include "kinespace/kernels/simd.h"
+#include "kinespace/synthesis/detail/player_parts.h"
 
 namespace kinespace {
 namespace {

@@ -22,8 +22,8 @@
 
 #include <Eigen/Core>
 
-#include "fpca/encoding.h"
-#include "synthesis/playback_basis.h"
+#include "kinespace/fpca/encoding.h"
+#include "kinespace/synthesis/playback_basis.h"
 
 namespace kinespace {
 
@@ -50,7 +50,7 @@ class Player {
   Eigen::Vector3f pose(double time_s, int functions, std::span<float> rotations) const;
 
  private:
-  friend struct PlayerParts;  // synthesis/player_parts.h
+  friend struct PlayerParts;  // synthesis/detail/player_parts.h
 
   std::shared_ptr<const PlayerParts> parts_;
 };

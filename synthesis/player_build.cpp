@@ -4,9 +4,9 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "fpca/cut_join.h"
-#include "synthesis/player_parts.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/cut_join.h"
+#include "kinespace/synthesis/detail/player_parts.h"
 
 namespace kinespace {
 namespace {

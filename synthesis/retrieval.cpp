@@ -1,4 +1,4 @@
-#include "synthesis/retrieval.h"
+#include "kinespace/synthesis/retrieval.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "fpca/pose_features.h"
-#include "kernels/dtw.h"
-#include "synthesis/library_clips.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/pose_features.h"
+#include "kinespace/kernels/dtw.h"
+#include "kinespace/synthesis/detail/library_clips.h"
 
 namespace kinespace {
 namespace {

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "base/progress.h"
-#include "fpca/library_view.h"
-#include "kernels/device.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/kernels/device.h"
+#include "kinespace/library/library_view.h"
 
 namespace kinespace {
 

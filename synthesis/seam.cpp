@@ -1,9 +1,9 @@
-#include "synthesis/seam.h"
+#include "kinespace/synthesis/seam.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "motion/kinematics.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "synthesis/transition.h"
+#include "kinespace/synthesis/transition.h"
 
 #include <algorithm>
 #include <array>
@@ -8,10 +8,10 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "motion/kinematics.h"
-#include "synthesis/curve_sampler.h"
-#include "synthesis/side_track_blend.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/synthesis/curve_sampler.h"
+#include "kinespace/synthesis/detail/side_track_blend.h"
 
 namespace kinespace {
 namespace {

@@ -16,10 +16,10 @@
 #include <string>
 #include <vector>
 
-#include "fpca/curves.h"
-#include "motion/clip.h"
-#include "synthesis/connection.h"
-#include "synthesis/seam.h"
+#include "kinespace/motion/clip.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/synthesis/connection.h"
+#include "kinespace/synthesis/seam.h"
 
 namespace kinespace {
 

@@ -1,12 +1,12 @@
-#include "synthesis/transition_plan.h"
+#include "kinespace/synthesis/transition_plan.h"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "synthesis/interpolation.h"
-#include "synthesis/library_clips.h"
+#include "kinespace/base/error.h"
+#include "kinespace/synthesis/detail/library_clips.h"
+#include "kinespace/synthesis/interpolation.h"
 
 namespace kinespace {
 namespace {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "base/progress.h"
-#include "fpca/library_view.h"
-#include "synthesis/motion_graph.h"
-#include "synthesis/transition.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/synthesis/motion_graph.h"
+#include "kinespace/synthesis/transition.h"
 
 namespace kinespace {
 

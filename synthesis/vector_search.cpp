@@ -1,4 +1,4 @@
-#include "synthesis/vector_search.h"
+#include "kinespace/synthesis/vector_search.h"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "kernels/simd.h"
+#include "kinespace/kernels/simd.h"
 
 namespace kinespace {
 namespace {

@@ -25,8 +25,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/aligned.h"
-#include "kernels/matrix.h"
+#include "kinespace/base/aligned.h"
+#include "kinespace/kernels/matrix.h"
 
 namespace kinespace {
 

@@ -6,11 +6,11 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "fpca/symmetric_eigen.h"
-#include "kernels/covariance.h"
-#include "kernels/projection.h"
-#include "synthesis/vector_search.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/symmetric_eigen.h"
+#include "kinespace/kernels/covariance.h"
+#include "kinespace/kernels/projection.h"
+#include "kinespace/synthesis/vector_search.h"
 
 namespace kinespace {
 namespace {

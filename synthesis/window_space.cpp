@@ -1,4 +1,4 @@
-#include "synthesis/window_space.h"
+#include "kinespace/synthesis/window_space.h"
 
 #include <algorithm>
 #include <cassert>
@@ -7,13 +7,13 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "fpca/clip_space.h"
-#include "fpca/motion_space.h"
-#include "fpca/symmetric_eigen.h"
-#include "kernels/covariance.h"
-#include "kernels/projection.h"
-#include "kernels/simd.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/clip_space.h"
+#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/symmetric_eigen.h"
+#include "kinespace/kernels/covariance.h"
+#include "kinespace/kernels/projection.h"
+#include "kinespace/kernels/simd.h"
 
 namespace kinespace {
 namespace {

@@ -19,8 +19,8 @@
 #include <span>
 #include <vector>
 
-#include "fpca/curves.h"
-#include "kernels/matrix.h"
+#include "kinespace/kernels/matrix.h"
+#include "kinespace/motion/curves.h"
 
 namespace kinespace {
 

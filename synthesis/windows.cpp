@@ -1,4 +1,4 @@
-#include "synthesis/windows.h"
+#include "kinespace/synthesis/windows.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "synthesis/library_clips.h"
+#include "kinespace/base/error.h"
+#include "kinespace/synthesis/detail/library_clips.h"
 
 namespace kinespace {
 namespace {

@@ -14,11 +14,11 @@
 #include <string>
 #include <vector>
 
-#include "base/progress.h"
-#include "fpca/library_view.h"
-#include "synthesis/retrieval.h"
-#include "synthesis/vector_search.h"
-#include "synthesis/window_space.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/synthesis/retrieval.h"
+#include "kinespace/synthesis/vector_search.h"
+#include "kinespace/synthesis/window_space.h"
 
 namespace kinespace {
 

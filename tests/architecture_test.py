@@ -17,19 +17,26 @@ ARROWS = {
     "motion": "base gltf",
     "storage": "base",
     "kernels": "base",
+    "entropy": "base",
     "fpca": "base motion storage kernels",
+    "library": "base motion storage kernels fpca",
     "footskate": "base motion storage",
-    "synthesis": "base motion storage kernels fpca",
+    "synthesis": "base motion storage kernels fpca library",
+    "repeats": "base motion",
     "mesh": "base gltf motion storage",
-    "codecs": "base motion storage kernels fpca mesh",
-    "examples": "base motion storage kernels fpca footskate synthesis mesh codecs",
-    "bench": "base motion storage kernels fpca footskate synthesis mesh codecs examples",
-    "cli": "base motion storage kernels fpca footskate synthesis mesh codecs bench",
-    "tests": "base gltf motion storage kernels fpca footskate synthesis mesh codecs examples bench cli",
+    "codecs": "base motion storage kernels fpca library repeats entropy",
+    "mesh_codecs": "base motion storage mesh entropy",
+    "include": "base motion storage kernels fpca library footskate synthesis repeats mesh codecs mesh_codecs",
+    "examples": "base motion storage kernels fpca library footskate synthesis mesh codecs",
+    "bench": "base motion storage kernels fpca library footskate synthesis repeats mesh entropy codecs mesh_codecs examples",
+    "cli": "base motion storage kernels fpca library footskate synthesis repeats mesh codecs mesh_codecs bench",
+    "tests": "base gltf motion storage kernels fpca library footskate synthesis repeats mesh entropy codecs mesh_codecs examples bench cli",
 }
+# Folders whose headers are included as kinespace/FOLDER/..., as those who install the library include them.
+LIBRARIES = set(ARROWS) - {"include", "examples", "bench", "cli", "tests"}
 ARROWS = {folder: set(others.split()) | {folder} for folder, others in ARROWS.items()}
 
-LONGEST_FILE = 500
+LONGEST_FILE = 900
 # What reads numbers by the locale of the process, which is the user's business and not a file's, or answers what is no number with an exception of its own, with 0 or with undefined behaviour.
 NUMBER_READERS = re.compile(r"\b(?:std::)?(?:sto(?:i|l|ll|ul|ull|f|d|ld)|ato(?:i|l|ll|f)|strto(?:l|ll|ul|ull|f|d|ld|imax|umax)|v?[fs]?w?scanf)\s*\(")
 SETS_LOCALE = re.compile(r"\bsetlocale\s*\(")
@@ -69,15 +76,18 @@ def arrows(root, file, text):
         yield f"the folder {folder}/ has no arrows in tests/architecture_test.py"
         return
     for included in INCLUDE.findall(text):
-        target = included.split("/")[0]
-        if included.endswith(".inc"):
+        path = included.removeprefix("kinespace/")
+        target = path.split("/")[0]
+        if included.endswith((".inc", "kinespace/version.h")):
             continue  # written by the build
         if file.suffix == ".cl" and (root / file.parent / included).is_file():
             continue  # kernels are put together from their own folder
-        if "/" not in included or not (root / included).is_file():
-            yield f'"{included}" is not the path of a file from the root of the checkout'
+        if "/" not in included or not (root / path).is_file() or (target in LIBRARIES) != (path != included):
+            yield f'"{included}" is not the path of a file from the root of the checkout, with kinespace/ before those of a library'
         elif target not in ARROWS[folder]:
             yield f"{folder}/ must not include {target}/ ({included})"
+        elif "/detail/" in path and folder not in (target, "tests"):
+            yield f"{included} is private to {target}/"
 
 
 def length(root, file, text):
@@ -142,18 +152,22 @@ def findings(root, rules=RULES):
 
 GOOD = {
     "base/error.h": "#pragma once\n",
-    "motion/clip.h": '#pragma once\n#include "base/error.h"\n',
-    "motion/clip.cpp": '#include "motion/clip.h"\nvoid f() try { g(); } catch (...) { undo(); throw; }\n',
+    "motion/clip.h": '#pragma once\n#include "kinespace/base/error.h"\n',
+    "motion/detail/frame.h": "#pragma once\n",
+    "motion/clip.cpp": '#include "kinespace/motion/clip.h"\n#include "kinespace/motion/detail/frame.h"\nvoid f() try { g(); } catch (...) { undo(); throw; }\n',
     "kernels/tile.cl": "\n",
     "kernels/product.cl": '#include "tile.cl"\n',
-    "tests/motion/clip_test.cpp": '#include "motion/clip.h"\n',
+    "tests/motion/clip_test.cpp": '#include "kinespace/motion/detail/frame.h"\n#include "tests/support/data.h"\n',
+    "tests/support/data.h": "#pragma once\n",
     "tests/motion/wait_test.cpp": "std::this_thread::sleep_for(std::chrono::seconds(1)); double time(int at); clip.time(0);\n",
 }
 # One breach a rule, and what its finding must say.
 BREACHES = [
-    (arrows, "base/clock.cpp", '#include "motion/clip.h"\n', "base/ must not include motion/"),
+    (arrows, "base/clock.cpp", '#include "kinespace/motion/clip.h"\n', "base/ must not include motion/"),
     (arrows, "motion/bad.cpp", '#include "clip.h"\n', "is not the path of a file"),
-    (arrows, "motion/gone.cpp", '#include "motion/gone.h"\n', "is not the path of a file"),
+    (arrows, "motion/gone.cpp", '#include "kinespace/motion/gone.h"\n', "is not the path of a file"),
+    (arrows, "motion/bare.cpp", '#include "base/error.h"\n', "is not the path of a file"),
+    (arrows, "fpca/inside.cpp", '#include "kinespace/motion/detail/frame.h"\n', "is private to motion/"),
     (arrows, "codex/new.cpp", "\n", "has no arrows"),
     (length, "base/long.cpp", "\n" * (LONGEST_FILE + 1), "more than one idea"),
     (catch_all, "base/mute.cpp", "void f() { try { g(); } catch (...) { /* throw; */ } }\n", "neither rethrows nor reports"),

@@ -1,13 +1,13 @@
 // The search for the tolerance that meets a target.
-#include "codecs/baselines/channel_codec.h"
+#include "kinespace/codecs/baselines/channel_codec.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "codecs/baselines/channel_encoder.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/baselines/detail/channel_encoder.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-// The codecs that the papers compare with, which all code the channels of a clip (codecs/joint_channels.h: the root's
+// The codecs that the papers compare with, which all code the channels of a clip (codecs/stream/joint_channels.h: the root's
 // position in cm, the joints' turns in unwrapped degrees) as coefficients of a transform over the whole clip:
 //
 //   pca        the clip's own principal poses (khan2014, section 4)
@@ -19,7 +19,7 @@
 
 #include <memory>
 
-#include "codecs/codec.h"
+#include "kinespace/codecs/stream/codec.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "codecs/baselines/raw_codec.h"
+#include "kinespace/codecs/baselines/raw_codec.h"
 
 #include <algorithm>
 #include <bit>
@@ -7,14 +7,14 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "codecs/baselines/packers.h"
-#include "codecs/baselines/stream_parts.h"
-#include "codecs/clip_table.h"
-#include "codecs/joint_channels.h"
-#include "codecs/registry.h"
-#include "fpca/curves.h"
-#include "storage/varint.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/baselines/detail/packers.h"
+#include "kinespace/codecs/baselines/detail/stream_parts.h"
+#include "kinespace/codecs/stream/clip_table.h"
+#include "kinespace/codecs/stream/codec.h"
+#include "kinespace/codecs/stream/joint_channels.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/storage/varint.h"
 
 namespace kinespace {
 namespace {

@@ -12,7 +12,7 @@
 
 #include <cstdint>
 
-#include "codecs/codec.h"
+#include "kinespace/codecs/stream/codec.h"
 
 namespace kinespace {
 

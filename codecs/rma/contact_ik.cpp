@@ -1,11 +1,11 @@
-#include "codecs/rma/contact_ik.h"
+#include "kinespace/codecs/rma/contact_ik.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <ranges>
 
-#include "codecs/rma/root_alignment.h"
+#include "kinespace/codecs/rma/root_alignment.h"
 
 namespace kinespace {
 namespace {

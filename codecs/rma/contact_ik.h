@@ -16,8 +16,8 @@
 
 #include <span>
 
-#include "codecs/rma/contact_trajectories.h"
-#include "motion/clip.h"
+#include "kinespace/codecs/rma/contact_trajectories.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

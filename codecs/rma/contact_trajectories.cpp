@@ -1,4 +1,4 @@
-#include "codecs/rma/contact_trajectories.h"
+#include "kinespace/codecs/rma/contact_trajectories.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,8 @@
 
 #include <fmt/format.h>
 
-#include "base/error.h"
-#include "motion/kinematics.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

@@ -20,8 +20,8 @@
 
 #include <Eigen/Core>
 
-#include "codecs/rma/value_coder.h"
-#include "motion/clip.h"
+#include "kinespace/entropy/value_coder.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace {
 

@@ -1,4 +1,4 @@
-#include "codecs/rma/marker_clips.h"
+#include "kinespace/codecs/rma/marker_clips.h"
 
 #include <algorithm>
 #include <array>

@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "codecs/clip_error.h"
-#include "codecs/clip_table.h"
-#include "codecs/rma/contact_trajectories.h"
-#include "codecs/rma/markers.h"
-#include "codecs/rma/root_alignment.h"
+#include "kinespace/codecs/rma/contact_trajectories.h"
+#include "kinespace/codecs/rma/markers.h"
+#include "kinespace/codecs/rma/root_alignment.h"
+#include "kinespace/codecs/stream/clip_error.h"
+#include "kinespace/codecs/stream/clip_table.h"
 
 namespace kinespace {
 

@@ -1,14 +1,14 @@
-#include "codecs/rma/marker_decoder.h"
+#include "kinespace/codecs/rma/marker_decoder.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "base/error.h"
-#include "codecs/rma/contact_ik.h"
-#include "codecs/rma/marker_clips.h"
-#include "codecs/rma/seam_easing.h"
-#include "codecs/rma/seams.h"
-#include "codecs/rma/spline_fit.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/rma/contact_ik.h"
+#include "kinespace/codecs/rma/detail/seam_easing.h"
+#include "kinespace/codecs/rma/detail/spline_fit.h"
+#include "kinespace/codecs/rma/marker_clips.h"
+#include "kinespace/codecs/rma/seams.h"
 
 namespace kinespace {
 namespace {

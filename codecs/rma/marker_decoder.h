@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "codecs/clip_table.h"
-#include "codecs/rma/marker_stream.h"
-#include "codecs/rma/markers.h"
+#include "kinespace/codecs/rma/marker_stream.h"
+#include "kinespace/codecs/rma/markers.h"
+#include "kinespace/codecs/stream/clip_table.h"
 
 namespace kinespace {
 

@@ -1,16 +1,16 @@
-#include "codecs/rma/marker_encoder.h"
+#include "kinespace/codecs/rma/marker_encoder.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "codecs/rma/adaptive_bits.h"
-#include "codecs/rma/contact_ik.h"
-#include "codecs/rma/marker_decoder.h"
-#include "codecs/rma/seam_easing.h"
-#include "codecs/rma/spline_fit.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/rma/contact_ik.h"
+#include "kinespace/codecs/rma/detail/seam_easing.h"
+#include "kinespace/codecs/rma/detail/spline_fit.h"
+#include "kinespace/codecs/rma/marker_decoder.h"
+#include "kinespace/entropy/adaptive_bits.h"
 
 namespace kinespace {
 namespace {

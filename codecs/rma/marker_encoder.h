@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "base/progress.h"
-#include "codecs/clip_error.h"
-#include "codecs/rma/marker_clips.h"
-#include "codecs/rma/marker_stream.h"
-#include "codecs/rma/repeats.h"
+#include "kinespace/base/progress.h"
+#include "kinespace/codecs/rma/marker_clips.h"
+#include "kinespace/codecs/rma/marker_stream.h"
+#include "kinespace/codecs/stream/clip_error.h"
+#include "kinespace/repeats/repeats.h"
 
 namespace kinespace {
 

@@ -1,12 +1,12 @@
-#include "codecs/rma/marker_reader.h"
+#include "kinespace/codecs/rma/marker_reader.h"
 
 #include <algorithm>
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "codecs/rma/marker_stream.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/rma/marker_stream.h"
 
 namespace kinespace {
 

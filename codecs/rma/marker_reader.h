@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "codecs/clip_table.h"
-#include "codecs/codec.h"
+#include "kinespace/codecs/stream/clip_table.h"
+#include "kinespace/codecs/stream/codec.h"
 
 namespace kinespace {
 

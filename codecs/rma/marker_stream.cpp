@@ -1,12 +1,12 @@
-#include "codecs/rma/marker_stream.h"
+#include "kinespace/codecs/rma/marker_stream.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
-#include "codecs/rma/adaptive_bits.h"
-#include "codecs/rma/seam_easing.h"
-#include "codecs/rma/spline_fit.h"
+#include "kinespace/codecs/rma/detail/seam_easing.h"
+#include "kinespace/codecs/rma/detail/spline_fit.h"
+#include "kinespace/entropy/adaptive_bits.h"
 
 namespace kinespace {
 namespace {

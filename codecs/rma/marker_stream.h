@@ -18,10 +18,10 @@
 #include <string>
 #include <vector>
 
-#include "base/bytes.h"
-#include "codecs/clip_table.h"
-#include "codecs/rma/contact_trajectories.h"
-#include "codecs/rma/root_alignment.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/codecs/rma/contact_trajectories.h"
+#include "kinespace/codecs/rma/root_alignment.h"
+#include "kinespace/codecs/stream/clip_table.h"
 
 namespace kinespace {
 

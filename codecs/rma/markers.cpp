@@ -1,4 +1,4 @@
-#include "codecs/rma/markers.h"
+#include "kinespace/codecs/rma/markers.h"
 
 #include <algorithm>
 #include <array>
@@ -6,8 +6,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include "base/error.h"
-#include "codecs/clip_table.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/stream/clip_table.h"
 
 namespace kinespace {
 namespace {

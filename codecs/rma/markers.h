@@ -29,10 +29,10 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "codecs/pose_vectors.h"
-#include "codecs/rma/frame_table.h"
-#include "codecs/rma/root_alignment.h"
-#include "motion/clip.h"
+#include "kinespace/codecs/rma/root_alignment.h"
+#include "kinespace/codecs/stream/pose_vectors.h"
+#include "kinespace/motion/clip.h"
+#include "kinespace/repeats/frame_table.h"
 
 namespace kinespace {
 

@@ -1,14 +1,14 @@
-#include "codecs/rma/rma_codec.h"
+#include "kinespace/codecs/rma/rma_codec.h"
 
 #include <array>
 
-#include "base/error.h"
-#include "codecs/registry.h"
-#include "codecs/rma/marker_reader.h"
-#include "codecs/rma/marker_stream.h"
-#include "codecs/rma/paper_profile.h"
-#include "codecs/rma/repeat_profile.h"
-#include "codecs/rma/repeat_stream.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/rma/detail/paper_profile.h"
+#include "kinespace/codecs/rma/detail/repeat_profile.h"
+#include "kinespace/codecs/rma/detail/repeat_stream.h"
+#include "kinespace/codecs/rma/marker_reader.h"
+#include "kinespace/codecs/rma/marker_stream.h"
+#include "kinespace/codecs/stream/codec.h"
 
 namespace kinespace {
 namespace {
@@ -69,7 +69,7 @@ std::vector<std::vector<int>> rma_seams(std::span<const std::byte> bytes, std::s
     return out;
   }
   RepeatTables tables;
-  tables.tables = unpack_motion_space_tables(stream.section("tables"), joints, stream.source());
+  tables.tables = unpack_pose_space_tables(stream.section("tables"), joints, stream.source());
   unpack_repeats(stream.section("repeats"), table, numbers, stream.source(), tables);
   std::size_t window = 0;
   for (std::size_t c = 0; c < out.size(); ++c) {

@@ -14,7 +14,7 @@
 // What it does not do: levels of detail; parts of a clip are cut from the whole clip.
 #pragma once
 
-#include "codecs/codec.h"
+#include "kinespace/codecs/stream/codec.h"
 
 namespace kinespace {
 

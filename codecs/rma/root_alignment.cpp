@@ -1,8 +1,8 @@
-#include "codecs/rma/root_alignment.h"
+#include "kinespace/codecs/rma/root_alignment.h"
 
 #include <algorithm>
 
-#include "codecs/natural_functions.h"
+#include "kinespace/codecs/stream/natural_functions.h"
 
 namespace kinespace {
 namespace {

@@ -10,7 +10,7 @@
 //   four: the heading about the vertical
 //   six:  heading * reference * tilt * reference^-1      so that an upright posture is the same in both
 //
-// with heading, reference and tilt as codecs/pose_vectors.h has them; all of it in the clip's own coarse frame.
+// with heading, reference and tilt as codecs/stream/pose_vectors.h has them; all of it in the clip's own coarse frame.
 // Curves are numbers per frame: x, y, z in cm, heading in radians, then for six the three parameters of the tilt.
 #pragma once
 
@@ -21,7 +21,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "codecs/pose_vectors.h"
+#include "kinespace/codecs/stream/pose_vectors.h"
 
 namespace kinespace {
 

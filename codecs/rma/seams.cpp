@@ -1,4 +1,4 @@
-#include "codecs/rma/seams.h"
+#include "kinespace/codecs/rma/seams.h"
 
 #include <algorithm>
 #include <utility>

@@ -12,7 +12,7 @@
 #include <gtest/gtest.h>
 
 #include "examples/sample_motions.h"
-#include "motion/read.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "base/bytes.h"
+#include "kinespace/base/bytes.h"
 
 #include <limits>
 

@@ -1,4 +1,4 @@
-#include "base/file.h"
+#include "kinespace/base/file.h"
 
 #include <array>
 #include <atomic>
@@ -15,7 +15,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/support/data.h"
 
 namespace kinespace {

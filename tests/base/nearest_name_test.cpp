@@ -1,4 +1,4 @@
-#include "base/nearest_name.h"
+#include "kinespace/base/nearest_name.h"
 
 #include <vector>
 

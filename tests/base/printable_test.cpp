@@ -1,10 +1,10 @@
-#include "base/printable.h"
+#include "kinespace/base/printable.h"
 
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

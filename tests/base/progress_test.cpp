@@ -1,4 +1,4 @@
-#include "base/progress.h"
+#include "kinespace/base/progress.h"
 
 #include <string>
 

@@ -15,8 +15,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 DOCUMENTS = ["README.md", "examples/README.md", "docs/synthesis.md", "docs/compression.md", "docs/command.md"]
 # Headers that begin with an example, and what it takes for given.
 HEADERS = {
-    "synthesis/motion_engine.h": '#include "motion/read.h"\n',
-    "codecs/codec.h": '#include "codecs/registry.h"\nusing namespace kinespace;\nextern const std::vector<Clip> clips;\n',
+    "synthesis/motion_engine.h": '#include "kinespace/motion/read.h"\n',
+    "codecs/stream/codec.h": '#include "kinespace/codecs/registry.h"\nusing namespace kinespace;\nextern const std::vector<Clip> clips;\n',
 }
 UNUSED = "#pragma GCC diagnostic ignored \"-Wunused\"\n"
 

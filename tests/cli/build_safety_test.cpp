@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 
 #include "examples/sample_motions.h"
-#include "motion/read.h"
-#include "storage/sqlite.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/storage/detail/sqlite.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

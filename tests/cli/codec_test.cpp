@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "codecs/registry.h"
 #include "examples/sample_motions.h"
-#include "motion/error_measures.h"
-#include "motion/read.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

@@ -9,10 +9,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/file.h"
 #include "cli/commands.h"
 #include "examples/sample_motions.h"
-#include "motion/read.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

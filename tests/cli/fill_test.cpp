@@ -6,10 +6,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "motion/error_measures.h"
-#include "motion/read.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
-#include "tests/synthesis/library_folder.h"
+#include "tests/support/library_folder.h"
 
 namespace kinespace::test {
 namespace {

@@ -3,15 +3,15 @@
 #include <filesystem>
 #include <limits>
 
-#include "bench/plot.h"
-#include "bench/report.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "bench/plot.h"
+#include "bench/report.h"
 #include "cli/json_output.h"
-#include "motion/error_measures.h"
-#include "motion/read.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

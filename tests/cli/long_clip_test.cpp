@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "examples/sample_motions.h"
-#include "motion/bvh.h"
+#include "kinespace/motion/bvh.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "mesh/mesh_files.h"
-#include "storage/library.h"
+#include "kinespace/mesh/mesh_files.h"
+#include "kinespace/storage/library.h"
 #include "tests/cli/run_command.h"
 #include "tests/gltf/sample_gltf.h"
 #include "tests/mesh/sample_meshes.h"

@@ -7,10 +7,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "base/printable.h"
-#include "codecs/registry.h"
 #include "examples/sample_motions.h"
-#include "motion/read.h"
+#include "kinespace/base/printable.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "examples/sample_motions.h"
-#include "motion/error_measures.h"
-#include "motion/read.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

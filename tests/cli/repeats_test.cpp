@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "examples/sample_motions.h"
-#include "motion/read.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 #include "examples/sample_motions.h"
-#include "motion/read.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

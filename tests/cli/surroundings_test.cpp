@@ -14,8 +14,8 @@
 
 #include "cli/progress_bar.h"
 #include "cli/session.h"
-#include "motion/error_measures.h"
-#include "motion/read.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 

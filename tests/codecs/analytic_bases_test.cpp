@@ -1,4 +1,4 @@
-#include "codecs/baselines/analytic_bases.h"
+#include "kinespace/codecs/baselines/detail/analytic_bases.h"
 
 #include <cmath>
 #include <numbers>

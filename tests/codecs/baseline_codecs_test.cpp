@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "base/error.h"
-#include "motion/error_measures.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/error_measures.h"
 #include "tests/codecs/sample_stream.h"
 
 namespace kinespace {

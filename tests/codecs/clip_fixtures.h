@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "base/file.h"
-#include "codecs/motion_space_basis.h"
-#include "codecs/registry.h"
+#include "kinespace/base/file.h"
+#include "kinespace/codecs/pose_space/pose_space_basis.h"
+#include "kinespace/codecs/registry.h"
 #include "tests/codecs/sample_stream.h"
 
 namespace kinespace::test {
@@ -31,9 +31,9 @@ inline std::filesystem::path basis_fixture() {
   return std::filesystem::path(KINESPACE_FIXTURES) / "motion_space_basis_v1.bin";
 }
 
-inline MotionSpaceBasis basis_of_fixture() {
+inline PoseSpaceBasis basis_of_fixture() {
   const FileContent file(basis_fixture());
-  return MotionSpaceBasis::unpack(file.bytes(), basis_fixture().string());
+  return PoseSpaceBasis::unpack(file.bytes(), basis_fixture().string());
 }
 
 struct ClipFixture {

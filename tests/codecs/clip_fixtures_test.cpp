@@ -17,7 +17,7 @@ INSTANTIATE_TEST_SUITE_P(All, FixedClipStream, testing::ValuesIn(clip_fixtures()
 TEST_P(FixedClipStream, decodes_to_the_same_bits_in_every_build) {
   const ClipFixture& fixture = GetParam();
   const FileContent file(fixture.path());
-  const std::optional<MotionSpaceBasis> basis = fixture.with_basis ? std::optional(basis_of_fixture()) : std::nullopt;
+  const std::optional<PoseSpaceBasis> basis = fixture.with_basis ? std::optional(basis_of_fixture()) : std::nullopt;
   for (const std::size_t threads : {1U, 3U}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     const auto reader = open_stream(file.bytes(), fixture.path().string(), basis ? &*basis : nullptr);

@@ -1,9 +1,9 @@
-#include "codecs/clip_table.h"
+#include "kinespace/codecs/stream/clip_table.h"
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
 #include "examples/sample_motions.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

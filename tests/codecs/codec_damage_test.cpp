@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "tests/codecs/forged_stream.h"
+#include "kinespace/base/error.h"
 #include "tests/codecs/sample_stream.h"
 #include "tests/support/allocation_meter.h"
+#include "tests/support/forged_stream.h"
 
 namespace kinespace {
 namespace {

@@ -1,5 +1,5 @@
 // Joint freedoms found from motion, and clips as channels of them.
-#include "codecs/joint_channels.h"
+#include "kinespace/codecs/stream/joint_channels.h"
 
 #include <cmath>
 #include <numbers>
@@ -7,11 +7,11 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "codecs/pose_vectors.h"
-#include "fpca/curves.h"
-#include "motion/amc.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/stream/pose_vectors.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/curves.h"
+#include "kinespace/motion/read.h"
 #include "tests/codecs/sample_stream.h"
 #include "tests/support/data.h"
 

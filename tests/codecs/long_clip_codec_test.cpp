@@ -5,10 +5,10 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "codecs/registry.h"
-#include "codecs/rma/contact_trajectories.h"
-#include "codecs/rma/markers.h"
 #include "examples/sample_motions.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/codecs/rma/contact_trajectories.h"
+#include "kinespace/codecs/rma/markers.h"
 #include "tests/support/allocation_meter.h"
 #include "tests/support/long_clip.h"
 

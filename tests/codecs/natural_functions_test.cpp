@@ -1,4 +1,4 @@
-#include "codecs/natural_functions.h"
+#include "kinespace/codecs/stream/natural_functions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "codecs/time_blocks.h"
+#include "kinespace/codecs/pose_space/time_blocks.h"
 
 namespace kinespace {
 namespace {

@@ -1,14 +1,14 @@
-#include "codecs/pose_vectors.h"
+#include "kinespace/codecs/stream/pose_vectors.h"
 
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "codecs/clip_error.h"
-#include "codecs/position_metric.h"
 #include "examples/sample_motions.h"
-#include "motion/kinematics.h"
+#include "kinespace/codecs/pose_space/position_metric.h"
+#include "kinespace/codecs/stream/clip_error.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
 namespace {

@@ -1,20 +1,20 @@
 // The promises of the qbc codec: its limit, joints and previews by themselves, and what it makes of recordings.
-#include "codecs/qbc_codec.h"
+#include "kinespace/codecs/qbc/qbc_codec.h"
 
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "codecs/joint_channels.h"
-#include "codecs/qbc/curve_choice.h"
-#include "codecs/qbc/qbc_stream.h"
-#include "motion/euler.h"
-#include "motion/read.h"
-#include "tests/codecs/forged_stream.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/qbc/detail/curve_choice.h"
+#include "kinespace/codecs/qbc/detail/qbc_stream.h"
+#include "kinespace/codecs/stream/joint_channels.h"
+#include "kinespace/motion/euler.h"
+#include "kinespace/motion/read.h"
 #include "tests/codecs/sample_stream.h"
 #include "tests/support/data.h"
+#include "tests/support/forged_stream.h"
 
 namespace kinespace {
 namespace {

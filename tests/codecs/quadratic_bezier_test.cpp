@@ -1,14 +1,14 @@
 // Quadratic Bezier break-and-fit against its plain definition, and its promises.
-#include "codecs/quadratic_bezier.h"
+#include "kinespace/codecs/qbc/quadratic_bezier.h"
 
 #include <cmath>
 
 #include <Eigen/Dense>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "codecs/joint_channels.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/stream/joint_channels.h"
+#include "kinespace/motion/read.h"
 #include "tests/support/data.h"
 
 namespace kinespace {

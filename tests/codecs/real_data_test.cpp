@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "motion/read.h"
+#include "kinespace/motion/read.h"
 #include "tests/codecs/sample_stream.h"
 #include "tests/support/data.h"
 

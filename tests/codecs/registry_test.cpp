@@ -1,8 +1,8 @@
-#include "codecs/registry.h"
+#include "kinespace/codecs/registry.h"
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/codecs/sample_stream.h"
 
 namespace kinespace {

@@ -1,5 +1,5 @@
 // The RMA codec and clip-pca whole: targets, profiles, hard motions, both kept against each other.
-#include "codecs/rma/rma_codec.h"
+#include "kinespace/codecs/rma/rma_codec.h"
 
 #include <cmath>
 #include <numbers>
@@ -7,8 +7,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "base/error.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/read.h"
 #include "tests/codecs/sample_stream.h"
 #include "tests/support/data.h"
 

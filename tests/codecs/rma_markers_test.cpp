@@ -3,9 +3,9 @@
 
 #include <gtest/gtest.h>
 
-#include "codecs/rma/markers.h"
-#include "motion/kinematics.h"
-#include "motion/read.h"
+#include "kinespace/codecs/rma/markers.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
 #include "tests/codecs/sample_stream.h"
 #include "tests/support/data.h"
 

@@ -3,13 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "codecs/rma/adaptive_bits.h"
-#include "codecs/rma/contact_ik.h"
-#include "codecs/rma/seams.h"
-#include "codecs/rma/spline_fit.h"
-#include "codecs/rma/value_coder.h"
-#include "codecs/rma/window_prediction.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/rma/contact_ik.h"
+#include "kinespace/codecs/rma/detail/spline_fit.h"
+#include "kinespace/codecs/rma/detail/window_prediction.h"
+#include "kinespace/codecs/rma/seams.h"
+#include "kinespace/entropy/adaptive_bits.h"
+#include "kinespace/entropy/value_coder.h"
 #include "tests/codecs/sample_stream.h"
 
 namespace kinespace {

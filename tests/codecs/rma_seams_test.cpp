@@ -5,12 +5,12 @@
 
 #include <gtest/gtest.h>
 
-#include "codecs/registry.h"
-#include "codecs/rma/rma_codec.h"
-#include "codecs/rma/seam_easing.h"
 #include "examples/sample_motions.h"
-#include "motion/kinematics.h"
-#include "motion/read.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/codecs/rma/detail/seam_easing.h"
+#include "kinespace/codecs/rma/rma_codec.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
 #include "tests/support/data.h"
 
 namespace kinespace {

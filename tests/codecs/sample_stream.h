@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <vector>
 
-#include "codecs/clip_error.h"
-#include "codecs/registry.h"
 #include "examples/sample_motions.h"
+#include "kinespace/codecs/registry.h"
+#include "kinespace/codecs/stream/clip_error.h"
 
 namespace kinespace::test {
 

@@ -1,11 +1,11 @@
 // What damaged motion-space streams give, beyond what every codec owes (codec_damage_test.cpp).
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "codecs/motion_space_tables.h"
-#include "storage/varint.h"
-#include "tests/codecs/forged_stream.h"
+#include "kinespace/base/error.h"
+#include "kinespace/codecs/pose_space/pose_space_tables.h"
+#include "kinespace/storage/varint.h"
 #include "tests/codecs/sample_stream.h"
+#include "tests/support/forged_stream.h"
 
 namespace kinespace {
 namespace {
@@ -52,7 +52,7 @@ TEST(StreamDamage, huge_counts_in_a_small_stream_are_refused_before_anything_is_
   clip.finer.assign(40000, 0);
   EXPECT_FALSE(stream_decodes(forged("clips", pack_clip_table(table))));
 
-  MotionSpaceTables tables = unpack_motion_space_tables(
+  PoseSpaceTables tables = unpack_motion_space_tables(
       stream.section("tables"), static_cast<int>(table.skeletons.front().rotating_joints().size()), "s");
   tables.basis.components = 4000;
   EXPECT_FALSE(stream_decodes(forged("tables", pack_motion_space_tables(tables))));

@@ -1,4 +1,4 @@
-#include "codecs/baselines/wavelets.h"
+#include "kinespace/codecs/baselines/detail/wavelets.h"
 
 #include <cmath>
 #include <numeric>

@@ -3,9 +3,9 @@
 #include <functional>
 #include <span>
 
-#include "base/file.h"
+#include "kinespace/base/file.h"
 #include "tests/codecs/clip_fixtures.h"
-#include "tests/codecs/mesh_fixtures.h"
+#include "tests/mesh_codecs/mesh_fixtures.h"
 
 namespace {
 
@@ -17,10 +17,10 @@ void write_if_missing(const std::filesystem::path& path, const std::function<Byt
 
 void write_clip_fixtures() {
   const std::vector<Clip> sample = test::clip_fixture_sample();
-  write_if_missing(test::basis_fixture(), [&] { return MotionSpaceBasis::learn(sample).pack(); });
+  write_if_missing(test::basis_fixture(), [&] { return PoseSpaceBasis::learn(sample).pack(); });
   for (const test::ClipFixture& fixture : test::clip_fixtures()) {
     write_if_missing(fixture.path(), [&] {
-      const MotionSpaceBasis basis = test::basis_of_fixture();
+      const PoseSpaceBasis basis = test::basis_of_fixture();
       CodecOptions options = fixture.options;
       if (fixture.with_basis) options.basis = &basis;
       return encode(fixture.codec, std::span(sample).first(fixture.clips), options);

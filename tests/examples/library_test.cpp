@@ -8,9 +8,9 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "base/error.h"
 #include "examples/sample_files.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/read.h"
 #include "tests/examples/sample_support.h"
 #include "tests/support/data.h"
 

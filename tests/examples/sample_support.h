@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "examples/sample_motions.h"
-#include "motion/kinematics.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace::test {
 

@@ -2,8 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "motion/kinematics.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/kinematics.h"
 #include "tests/footskate/skating.h"
 
 namespace kinespace {

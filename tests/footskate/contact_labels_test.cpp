@@ -1,10 +1,10 @@
 // Labels as text and in a library.
-#include "footskate/contact_labels.h"
+#include "kinespace/footskate/contact_labels.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/footskate/skating.h"
 #include "tests/support/data.h"
 

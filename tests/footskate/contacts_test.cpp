@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/footskate/skating.h"
 
 namespace kinespace {

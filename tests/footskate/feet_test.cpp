@@ -1,10 +1,10 @@
 // Feet by name, by shape and as named by the user.
-#include "footskate/feet.h"
+#include "kinespace/footskate/feet.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/footskate/skating.h"
 
 namespace kinespace {

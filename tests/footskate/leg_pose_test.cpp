@@ -1,5 +1,5 @@
 // Posing legs in place, and back.
-#include "footskate/leg_pose.h"
+#include "kinespace/footskate/detail/leg_pose.h"
 
 #include <gtest/gtest.h>
 

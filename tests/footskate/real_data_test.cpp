@@ -1,7 +1,7 @@
 // Captured motion: walks, uneven ground, climbing.
 #include <gtest/gtest.h>
 
-#include "motion/read.h"
+#include "kinespace/motion/read.h"
 #include "tests/footskate/skating.h"
 #include "tests/support/data.h"
 

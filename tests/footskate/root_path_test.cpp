@@ -1,5 +1,5 @@
 // The root's path of a long clip, solved part by part.
-#include "footskate/root_path.h"
+#include "kinespace/footskate/detail/root_path.h"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "examples/contact_training.h"
-#include "footskate/cleanup.h"
-#include "footskate/skate_measures.h"
+#include "kinespace/footskate/cleanup.h"
+#include "kinespace/footskate/skate_measures.h"
 
 namespace kinespace::test {
 

@@ -1,5 +1,5 @@
 // Two-bone inverse kinematics: it reaches, keeps bones and the knee's plane, and is soft near full length.
-#include "footskate/two_bone_ik.h"
+#include "kinespace/footskate/two_bone_ik.h"
 
 #include <random>
 

@@ -1,4 +1,4 @@
-#include "fpca/analytic_basis.h"
+#include "kinespace/fpca/analytic_basis.h"
 
 #include <cmath>
 #include <numbers>
@@ -6,7 +6,7 @@
 #include <Eigen/QR>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/fpca/sample_curves.h"
 
 namespace kinespace {

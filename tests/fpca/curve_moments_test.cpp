@@ -1,4 +1,4 @@
-#include "fpca/curve_moments.h"
+#include "kinespace/fpca/curve_moments.h"
 
 #include <limits>
 #include <thread>
@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/fpca/sample_curves.h"
 
 namespace kinespace {

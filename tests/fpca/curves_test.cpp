@@ -1,4 +1,4 @@
-#include "fpca/curves.h"
+#include "kinespace/motion/curves.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,10 +9,10 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "fpca/pose_features.h"
-#include "fpca/uniform_spline.h"
-#include "motion/error_measures.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/pose_features.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/uniform_spline.h"
 #include "tests/fpca/sample_space.h"
 #include "tests/support/long_clip.h"
 

@@ -1,5 +1,5 @@
 // The consistent mode, and what both modes share. pace_test.cpp has smoothing, noise and conditional scores.
-#include "fpca/functional_pca.h"
+#include "kinespace/fpca/functional_pca.h"
 
 #include <cmath>
 #include <functional>
@@ -11,7 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/fpca/sample_curves.h"
 
 namespace kinespace {

@@ -1,4 +1,4 @@
-#include "fpca/golden.h"
+#include "bench/golden.h"
 
 #include <fstream>
 #include <string>
@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/support/data.h"
 
 namespace kinespace {

@@ -1,4 +1,4 @@
-#include "kernels/local_linear.h"
+#include "kinespace/kernels/local_linear.h"
 
 #include <cmath>
 #include <vector>
@@ -6,7 +6,7 @@
 #include <Eigen/QR>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/fpca/sample_curves.h"
 
 namespace kinespace {

@@ -1,12 +1,12 @@
-#include "fpca/motion_space.h"
+#include "kinespace/fpca/motion_space.h"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
-#include "base/error.h"
-#include "fpca/space_codec.h"
-#include "motion/error_measures.h"
-#include "motion/kinematics.h"
+#include "kinespace/base/error.h"
+#include "kinespace/library/detail/space_codec.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/kinematics.h"
 #include "tests/fpca/sample_space.h"
 #include "tests/support/data.h"
 

@@ -6,9 +6,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "fpca/functional_pca.h"
-#include "fpca/symmetric_eigen.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/functional_pca.h"
+#include "kinespace/fpca/symmetric_eigen.h"
 #include "tests/fpca/sample_curves.h"
 
 namespace kinespace {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <random>
 
-#include "fpca/curve_moments.h"
+#include "kinespace/fpca/curve_moments.h"
 
 namespace kinespace::test {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "examples/sample_motions.h"
-#include "fpca/space_builder.h"
+#include "kinespace/fpca/space_builder.h"
 
 namespace kinespace::test {
 

@@ -1,11 +1,11 @@
-#include "fpca/sequences.h"
+#include "kinespace/fpca/sequences.h"
 
 #include <array>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "fpca/warp.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/warp.h"
 #include "tests/fpca/sample_space.h"
 
 namespace kinespace {

@@ -1,4 +1,4 @@
-#include "fpca/spline.h"
+#include "kinespace/fpca/detail/spline.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

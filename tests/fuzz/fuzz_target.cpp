@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "base/error.h"
-#include "tests/codecs/forged_stream.h"
+#include "kinespace/base/error.h"
+#include "tests/support/forged_stream.h"
 
 namespace kinespace::fuzz {
 namespace {

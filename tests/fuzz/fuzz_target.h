@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <span>
 
-#include "base/bytes.h"
+#include "kinespace/base/bytes.h"
 
 namespace kinespace::fuzz {
 

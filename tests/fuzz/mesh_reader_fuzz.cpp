@@ -2,8 +2,8 @@
 #include <cstdint>
 #include <string_view>
 
-#include "base/error.h"
-#include "mesh/mesh_formats.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::fuzz {

@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <string>
 
-#include "base/error.h"
-#include "base/file.h"
 #include "examples/sample_motions.h"
-#include "mesh/mesh_formats.h"
-#include "motion/gltf.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
+#include "kinespace/motion/gltf.h"
 #include "tests/gltf/sample_gltf.h"
 #include "tests/mesh/sample_meshes.h"
 

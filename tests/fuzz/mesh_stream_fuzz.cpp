@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "codecs/mesh/mesh_codec.h"
+#include "kinespace/mesh_codecs/mesh_codec.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/mesh/sample_meshes.h"
 

@@ -8,16 +8,16 @@
 
 #include <unistd.h>
 
-#include "base/bytes.h"
-#include "base/error.h"
-#include "base/file.h"
 #include "examples/sample_motions.h"
-#include "fpca/library_builder.h"
-#include "fpca/library_view.h"
-#include "motion/amc.h"
-#include "motion/asf.h"
-#include "motion/bvh.h"
-#include "motion/read.h"
+#include "kinespace/base/bytes.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/asf.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/read.h"
 
 namespace kinespace::fuzz {
 namespace {

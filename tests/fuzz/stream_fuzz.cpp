@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <vector>
 
-#include "codecs/registry.h"
 #include "examples/sample_motions.h"
+#include "kinespace/codecs/registry.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace kinespace::fuzz {

@@ -5,9 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "mesh/mesh_files.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/mesh/mesh_files.h"
 #include "tests/gltf/sample_gltf.h"
 #include "tests/support/data.h"
 

@@ -3,12 +3,12 @@
 #include <map>
 #include <string>
 
-#include "gltf/json_shape.h"
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "mesh/mesh_formats.h"
+#include "kinespace/base/error.h"
+#include "kinespace/gltf/detail/json_shape.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
 #include "tests/gltf/sample_gltf.h"
 #include "tests/support/allocation_meter.h"
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh/mesh_formats.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
 #include "tests/gltf/sample_gltf.h"
 #include "tests/mesh/sample_meshes.h"
 

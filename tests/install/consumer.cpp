@@ -3,11 +3,11 @@
 #include <cstdio>
 #include <filesystem>
 
-#include "base/error.h"
-#include "motion/clip.h"
-#include "motion/error_measures.h"
-#include "motion/read.h"
-#include "motion/skeleton.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/clip.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/motion/skeleton.h"
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;

@@ -1,11 +1,11 @@
-#include "kernels/covariance.h"
+#include "kinespace/kernels/covariance.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -1,11 +1,11 @@
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 
 #include <cstdlib>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "kernels/dtw.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/dtw.h"
 #include "tests/kernels/opencl_device.h"
 
 namespace kinespace {

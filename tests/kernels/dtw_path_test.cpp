@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "kernels/dtw.h"
+#include "kinespace/kernels/dtw.h"
 #include "tests/kernels/dtw_support.h"
 
 namespace kinespace {

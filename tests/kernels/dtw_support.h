@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "kernels/dtw.h"
+#include "kinespace/kernels/dtw.h"
 
 namespace kinespace::test {
 

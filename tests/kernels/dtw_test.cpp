@@ -1,4 +1,4 @@
-#include "kernels/dtw.h"
+#include "kinespace/kernels/dtw.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/kernels/dtw_support.h"
 #include "tests/kernels/opencl_device.h"
 

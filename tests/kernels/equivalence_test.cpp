@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "kernels/kernel_descriptor.h"
+#include "kinespace/kernels/kernel_descriptor.h"
 #include "tests/kernels/opencl_device.h"
 
 namespace kinespace {

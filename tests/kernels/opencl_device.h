@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "kernels/device.h"
+#include "kinespace/kernels/device.h"
 #include "tests/support/data.h"
 
 #define KINESPACE_REQUIRE_OPENCL()                                                         \

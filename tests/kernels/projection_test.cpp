@@ -1,11 +1,11 @@
-#include "kernels/projection.h"
+#include "kinespace/kernels/projection.h"
 
 #include <Eigen/QR>
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
-#include "base/error.h"
-#include "kernels/keyframe_distance.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/keyframe_distance.h"
 
 namespace kinespace {
 namespace {

@@ -1,12 +1,12 @@
-#include "mesh/decimation.h"
+#include "kinespace/mesh/decimation.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "mesh/mesh_error.h"
-#include "mesh/mesh_report.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/mesh_error.h"
+#include "kinespace/mesh/mesh_report.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

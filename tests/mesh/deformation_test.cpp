@@ -1,11 +1,11 @@
-#include "mesh/deformation.h"
+#include "kinespace/mesh/deformation.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 
-#include "mesh/harmonics.h"
-#include "mesh/laplacian.h"
-#include "mesh/smooth_basis.h"
+#include "kinespace/mesh/harmonics.h"
+#include "kinespace/mesh/laplacian.h"
+#include "kinespace/mesh/smooth_basis.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

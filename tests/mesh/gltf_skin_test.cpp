@@ -3,12 +3,12 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
 #include "examples/sample_motions.h"
-#include "mesh/mesh_formats.h"
-#include "mesh/mesh_report.h"
-#include "motion/gltf.h"
-#include "motion/kinematics.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
+#include "kinespace/mesh/mesh_report.h"
+#include "kinespace/motion/gltf.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace::test {
 namespace {

@@ -1,10 +1,10 @@
-#include "mesh/harmonics.h"
+#include "kinespace/mesh/harmonics.h"
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "mesh/eigenpairs.h"
-#include "mesh/laplacian.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/detail/eigenpairs.h"
+#include "kinespace/mesh/laplacian.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

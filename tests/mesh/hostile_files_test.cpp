@@ -4,8 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "mesh/mesh_formats.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

@@ -1,4 +1,4 @@
-#include "mesh/laplacian.h"
+#include "kinespace/mesh/laplacian.h"
 
 #include <cmath>
 

@@ -1,11 +1,11 @@
-#include "mesh/mesh_error.h"
+#include "kinespace/mesh/mesh_error.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

@@ -1,4 +1,4 @@
-#include "mesh/mesh_files.h"
+#include "kinespace/mesh/mesh_files.h"
 
 #include <array>
 #include <bit>
@@ -8,9 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "mesh/mesh_formats.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/mesh/detail/mesh_formats.h"
 #include "tests/mesh/sample_meshes.h"
 #include "tests/support/data.h"
 

@@ -1,11 +1,11 @@
-#include "mesh/mesh_report.h"
+#include "kinespace/mesh/mesh_report.h"
 
 #include <limits>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "mesh/connectivity.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/connectivity.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

@@ -1,8 +1,8 @@
-#include "mesh/picture.h"
+#include "kinespace/mesh/picture.h"
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

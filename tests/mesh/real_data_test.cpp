@@ -4,15 +4,15 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh/decimation.h"
-#include "mesh/deformation.h"
-#include "mesh/harmonics.h"
-#include "mesh/mesh_error.h"
-#include "mesh/mesh_files.h"
-#include "mesh/mesh_report.h"
-#include "mesh/picture.h"
-#include "mesh/rigid.h"
-#include "mesh/smooth_basis.h"
+#include "kinespace/mesh/decimation.h"
+#include "kinespace/mesh/deformation.h"
+#include "kinespace/mesh/harmonics.h"
+#include "kinespace/mesh/mesh_error.h"
+#include "kinespace/mesh/mesh_files.h"
+#include "kinespace/mesh/mesh_report.h"
+#include "kinespace/mesh/picture.h"
+#include "kinespace/mesh/rigid.h"
+#include "kinespace/mesh/smooth_basis.h"
 #include "tests/mesh/sample_meshes.h"
 #include "tests/support/data.h"
 

@@ -1,4 +1,4 @@
-#include "mesh/rigid.h"
+#include "kinespace/mesh/rigid.h"
 
 #include <random>
 
@@ -6,8 +6,8 @@
 #include <Eigen/SVD>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "mesh/rotation_fit.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/detail/rotation_fit.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

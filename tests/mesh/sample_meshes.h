@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "mesh/mesh_sequence.h"
+#include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace::test {
 

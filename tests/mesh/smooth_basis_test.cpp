@@ -1,12 +1,12 @@
-#include "mesh/smooth_basis.h"
+#include "kinespace/mesh/smooth_basis.h"
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "mesh/dense_kernels.h"
-#include "mesh/harmonics.h"
-#include "mesh/laplacian.h"
-#include "mesh/sparse_solver.h"
+#include "kinespace/base/error.h"
+#include "kinespace/mesh/detail/dense_kernels.h"
+#include "kinespace/mesh/harmonics.h"
+#include "kinespace/mesh/laplacian.h"
+#include "kinespace/mesh/sparse_solver.h"
 #include "tests/mesh/sample_meshes.h"
 
 namespace kinespace::test {

@@ -1,4 +1,4 @@
-#include "motion/amc.h"
+#include "kinespace/motion/amc.h"
 
 #include <numbers>
 #include <string>
@@ -6,8 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "motion/bvh.h"
-#include "motion/kinematics.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/kinematics.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/support/data.h"
 

@@ -1,4 +1,4 @@
-#include "motion/asf.h"
+#include "kinespace/motion/asf.h"
 
 #include <numbers>
 #include <string>

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "motion/bvh.h"
+#include "kinespace/motion/bvh.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/support/data.h"
 

@@ -1,4 +1,4 @@
-#include "motion/bvh.h"
+#include "kinespace/motion/bvh.h"
 
 #include <cmath>
 #include <fstream>
@@ -9,8 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "motion/kinematics.h"
-#include "motion/text.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/text.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/support/data.h"
 

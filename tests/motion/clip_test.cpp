@@ -1,4 +1,4 @@
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "motion/error_measures.h"
+#include "kinespace/motion/error_measures.h"
 
 #include <cmath>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "motion/euler.h"
+#include "kinespace/motion/euler.h"
 
 #include <cmath>
 #include <numbers>

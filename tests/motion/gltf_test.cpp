@@ -1,4 +1,4 @@
-#include "motion/gltf.h"
+#include "kinespace/motion/gltf.h"
 
 #include <clocale>
 #include <cmath>
@@ -14,9 +14,9 @@
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
-#include "base/file.h"
-#include "motion/kinematics.h"
-#include "motion/read.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/support/data.h"
 

@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "motion/amc.h"
-#include "motion/bvh.h"
-#include "motion/kinematics.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/kinematics.h"
 #include "tests/motion/allocation_meter.h"
 #include "tests/motion/sample_clips.h"
 

@@ -1,11 +1,11 @@
-#include "motion/kinematics.h"
+#include "kinespace/motion/kinematics.h"
 
 #include <algorithm>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "motion/position_blocks.h"
+#include "kinespace/motion/position_blocks.h"
 #include "tests/motion/sample_clips.h"
 
 namespace kinespace::test {

@@ -9,11 +9,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "motion/amc.h"
-#include "motion/bvh.h"
-#include "motion/bvh_hierarchy.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/detail/bvh_hierarchy.h"
 #include "tests/motion/allocation_meter.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/motion/watched_text.h"

@@ -1,4 +1,4 @@
-#include "motion/plausibility.h"
+#include "kinespace/motion/plausibility.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "motion/read.h"
+#include "kinespace/motion/read.h"
 #include "tests/support/data.h"
 
 namespace kinespace {

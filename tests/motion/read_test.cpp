@@ -1,4 +1,4 @@
-#include "motion/read.h"
+#include "kinespace/motion/read.h"
 
 #include <clocale>
 #include <cstdlib>
@@ -9,10 +9,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/file.h"
-#include "motion/amc.h"
-#include "motion/bvh.h"
-#include "motion/gltf.h"
+#include "kinespace/base/file.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/gltf.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/support/data.h"
 

@@ -9,10 +9,10 @@
 
 #include <gtest/gtest.h>
 
-#include "motion/amc.h"
-#include "motion/bvh.h"
-#include "motion/kinematics.h"
-#include "motion/read.h"
+#include "kinespace/motion/amc.h"
+#include "kinespace/motion/bvh.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/support/data.h"
 

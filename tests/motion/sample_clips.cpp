@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "motion/euler.h"
-#include "motion/kinematics.h"
+#include "kinespace/motion/euler.h"
+#include "kinespace/motion/kinematics.h"
 
 namespace kinespace::test {
 

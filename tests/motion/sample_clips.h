@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-#include "base/error.h"
-#include "motion/clip.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace::test {
 

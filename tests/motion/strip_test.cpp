@@ -1,11 +1,11 @@
-#include "motion/strip.h"
+#include "kinespace/motion/strip.h"
 
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 #include "tests/support/data.h"
 
 namespace kinespace {

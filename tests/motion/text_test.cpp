@@ -1,4 +1,4 @@
-#include "motion/text.h"
+#include "kinespace/motion/text.h"
 
 #include <charconv>
 #include <cmath>

@@ -5,11 +5,11 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "storage/bitstream.h"
-#include "storage/bitstream_format.h"
-#include "storage/varint.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/storage/bitstream.h"
+#include "kinespace/storage/detail/bitstream_format.h"
+#include "kinespace/storage/varint.h"
 #include "tests/storage/sample_stream.h"
 
 namespace kinespace {

@@ -1,4 +1,4 @@
-#include "storage/bitstream.h"
+#include "kinespace/storage/bitstream.h"
 
 #include <cmath>
 #include <filesystem>
@@ -6,9 +6,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "storage/bitstream_version.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/storage/detail/bitstream_version.h"
 #include "tests/storage/sample_stream.h"
 
 namespace kinespace {

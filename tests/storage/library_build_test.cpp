@@ -1,4 +1,4 @@
-#include "storage/library_build.h"
+#include "kinespace/storage/library_build.h"
 
 #include <csignal>
 #include <thread>
@@ -8,8 +8,8 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "base/error.h"
-#include "base/file.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
 #include "tests/storage/sample_library.h"
 #include "tests/storage/sample_stream.h"
 #include "tests/support/data.h"

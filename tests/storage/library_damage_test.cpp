@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "base/file.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
 #include "tests/storage/sample_library.h"
 #include "tests/support/data.h"
 

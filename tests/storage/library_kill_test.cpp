@@ -10,8 +10,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "base/error.h"
-#include "storage/library_build.h"
+#include "kinespace/base/error.h"
+#include "kinespace/storage/library_build.h"
 #include "tests/storage/disk_meter.h"
 #include "tests/storage/sample_library.h"
 #include "tests/support/data.h"

@@ -2,10 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "storage/library_build.h"
-#include "storage/sqlite.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/storage/detail/sqlite.h"
+#include "kinespace/storage/library_build.h"
 #include "tests/storage/sample_library.h"
 #include "tests/storage/sample_stream.h"
 #include "tests/support/allocation_meter.h"

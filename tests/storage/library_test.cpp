@@ -1,4 +1,4 @@
-#include "storage/library.h"
+#include "kinespace/storage/library.h"
 
 #include <cmath>
 #include <fstream>
@@ -8,8 +8,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "base/error.h"
-#include "base/file.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
 #include "tests/storage/sample_library.h"
 #include "tests/storage/sample_stream.h"
 #include "tests/support/data.h"

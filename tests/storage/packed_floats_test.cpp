@@ -1,4 +1,4 @@
-#include "storage/packed_floats.h"
+#include "kinespace/storage/packed_floats.h"
 
 #include <bit>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

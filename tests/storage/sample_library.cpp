@@ -8,9 +8,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "base/error.h"
-#include "base/file.h"
-#include "storage/bitstream.h"
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/storage/bitstream.h"
 #include "tests/storage/sample_stream.h"
 
 namespace kinespace::test {

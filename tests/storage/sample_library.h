@@ -8,8 +8,8 @@
 
 #include <sys/types.h>
 
-#include "base/error.h"
-#include "storage/library.h"
+#include "kinespace/base/error.h"
+#include "kinespace/storage/library.h"
 
 namespace kinespace::test {
 

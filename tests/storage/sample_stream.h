@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-#include "storage/bitstream.h"
+#include "kinespace/storage/bitstream.h"
 
 namespace kinespace::test {
 

@@ -1,4 +1,4 @@
-#include "storage/varint.h"
+#include "kinespace/storage/varint.h"
 
 #include <limits>
 #include <vector>

@@ -2,7 +2,7 @@
 #include <filesystem>
 #include <span>
 
-#include "base/file.h"
+#include "kinespace/base/file.h"
 #include "tests/storage/sample_library.h"
 #include "tests/storage/sample_stream.h"
 

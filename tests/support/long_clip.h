@@ -1,7 +1,7 @@
 // Clips as long as a test wants them.
 #pragma once
 
-#include "motion/clip.h"
+#include "kinespace/motion/clip.h"
 
 namespace kinespace::test {
 

@@ -1,14 +1,14 @@
-#include "synthesis/connection.h"
+#include "kinespace/synthesis/connection.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "fpca/functional_pca.h"
-#include "fpca/library_view.h"
-#include "synthesis/graph_bridges.h"
-#include "tests/synthesis/library_folder.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/functional_pca.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/synthesis/detail/graph_bridges.h"
+#include "tests/support/library_folder.h"
 
 namespace kinespace {
 namespace {

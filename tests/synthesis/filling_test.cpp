@@ -1,4 +1,4 @@
-#include "synthesis/filling.h"
+#include "kinespace/synthesis/filling.h"
 
 #include <cmath>
 #include <limits>
@@ -6,14 +6,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "base/error.h"
 #include "examples/sample_motions.h"
-#include "fpca/library_builder.h"
-#include "motion/error_measures.h"
-#include "motion/kinematics.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
 #include "tests/support/data.h"
-#include "tests/synthesis/library_folder.h"
+#include "tests/support/library_folder.h"
 
 namespace kinespace::test {
 namespace {

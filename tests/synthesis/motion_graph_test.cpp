@@ -1,14 +1,14 @@
-#include "synthesis/motion_graph.h"
+#include "kinespace/synthesis/motion_graph.h"
 
 #include <algorithm>
 #include <map>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "synthesis/graph_ways.h"
-#include "synthesis/transition_plan.h"
-#include "tests/synthesis/library_folder.h"
+#include "kinespace/base/error.h"
+#include "kinespace/synthesis/detail/graph_ways.h"
+#include "kinespace/synthesis/transition_plan.h"
+#include "tests/support/library_folder.h"
 
 namespace kinespace {
 namespace {

@@ -1,4 +1,4 @@
-#include "synthesis/player.h"
+#include "kinespace/synthesis/player.h"
 
 #include <array>
 #include <cmath>
@@ -6,11 +6,11 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
 #include "examples/sample_motions.h"
-#include "fpca/library_builder.h"
-#include "fpca/space_builder.h"
-#include "motion/read.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/space_builder.h"
+#include "kinespace/library/library_builder.h"
+#include "kinespace/motion/read.h"
 #include "tests/support/data.h"
 
 namespace kinespace {

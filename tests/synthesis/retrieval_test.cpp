@@ -1,13 +1,13 @@
-#include "synthesis/retrieval.h"
+#include "kinespace/synthesis/retrieval.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "kernels/dtw_detail.h"
-#include "tests/synthesis/library_folder.h"
+#include "kinespace/base/error.h"
+#include "kinespace/kernels/detail/dtw.h"
+#include "tests/support/library_folder.h"
 
 namespace kinespace {
 namespace {

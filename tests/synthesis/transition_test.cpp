@@ -3,13 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "motion/error_measures.h"
-#include "motion/kinematics.h"
-#include "synthesis/interpolation.h"
-#include "synthesis/motion_engine.h"
-#include "synthesis/transition_plan.h"
-#include "tests/synthesis/library_folder.h"
+#include "kinespace/base/error.h"
+#include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/synthesis/interpolation.h"
+#include "kinespace/synthesis/motion_engine.h"
+#include "kinespace/synthesis/transition_plan.h"
+#include "tests/support/library_folder.h"
 
 namespace kinespace {
 namespace {

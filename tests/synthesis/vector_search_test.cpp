@@ -1,4 +1,4 @@
-#include "synthesis/vector_search.h"
+#include "kinespace/synthesis/vector_search.h"
 
 #include <cmath>
 #include <limits>
@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
+#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {

@@ -1,13 +1,13 @@
-#include "synthesis/windows.h"
+#include "kinespace/synthesis/windows.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "base/error.h"
-#include "fpca/functional_pca.h"
-#include "tests/synthesis/library_folder.h"
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/functional_pca.h"
+#include "tests/support/library_folder.h"
 
 namespace kinespace {
 namespace {

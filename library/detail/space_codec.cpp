@@ -1,0 +1,451 @@
+#include "kinespace/library/detail/space_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "kinespace/base/error.h"
+#include "kinespace/fpca/space_builder.h"
+#include "kinespace/storage/bitstream.h"
+#include "kinespace/storage/packed_floats.h"
+#include "kinespace/storage/varint.h"
+
+namespace kinespace {
+namespace {
+
+constexpr std::int64_t most_joints = 4096;
+constexpr std::int64_t most_points = 1024;
+
+void put_vector3(ByteWriter& out, const Eigen::Vector3d& v) {
+  out.put_array(std::span<const double>(v.data(), 3));
+}
+
+Eigen::Vector3d get_vector3(ByteReader& in) {
+  Eigen::Vector3d v;
+  for (int i = 0; i < 3; ++i) v(i) = in.get<double>();
+  if (!v.allFinite()) in.fail("an offset that is no number", "finite values");
+  return v;
+}
+
+// Column by column.
+void put_matrix(ByteWriter& out, const Eigen::MatrixXd& m) {
+  out.put_array(std::span<const double>(m.data(), static_cast<std::size_t>(m.size())));
+}
+
+Eigen::MatrixXd get_matrix(ByteReader& in, Eigen::Index rows, Eigen::Index cols) {
+  const auto values = in.get_array<double>(static_cast<std::uint64_t>(rows) * static_cast<std::uint64_t>(cols));
+  Eigen::MatrixXd out = Eigen::Map<const Eigen::MatrixXd>(values.data(), rows, cols);
+  if (!out.allFinite()) in.fail("a value that is no number", "finite values");
+  return out;
+}
+
+Bytes group_section(const FunctionGroup& group, const CurveMoments& moments) {
+  ByteWriter out;
+  put_varint(out, static_cast<std::uint64_t>(group.functions.cols()));
+  put_varint(out, static_cast<std::uint64_t>(moments.count()));
+  out.put(group.variance);
+  put_matrix(out, group.mean);
+  put_matrix(out, group.eigenvalues);
+  put_matrix(out, group.functions);
+  put_matrix(out, moments.mean());
+  put_matrix(out, moments.scatter());
+  return std::move(out).take();
+}
+
+std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> bytes, int points,
+                                                   const std::string& source) {
+  ByteReader in(bytes, source);
+  const std::uint64_t functions = get_varint(in);
+  if (functions > static_cast<std::uint64_t>(points)) {
+    in.fail(fmt::format("{} functions", functions), fmt::format("at most {}", points));
+  }
+  const auto k = static_cast<Eigen::Index>(functions);
+  const auto count = static_cast<std::int64_t>(get_varint(in) & 0x7fffffffffffffffU);
+  FunctionGroup group;
+  group.variance = in.get<double>();
+  group.mean = get_matrix(in, points, 1);
+  group.eigenvalues = get_matrix(in, k, 1);
+  group.functions = get_matrix(in, points, k);
+  const Eigen::VectorXd mean = get_matrix(in, points, 1);
+  const Eigen::MatrixXd scatter = get_matrix(in, points, points);
+  in.expect_end();
+  return {std::move(group), CurveMoments(count, mean, scatter)};
+}
+
+std::string group_name(std::size_t i) {
+  return fmt::format("group {}", i);
+}
+
+float stored_steps(float score) {
+  return static_cast<float>(std::round(static_cast<double>(score) / score_step));
+}
+
+// One function's scores of all sequences of a clip, in steps, as whole floats: their low bytes are zero and pack well.
+Bytes score_block(const std::vector<const EncodedSequence*>& sequences, Eigen::Index function) {
+  std::vector<float> steps;
+  for (const EncodedSequence* s : sequences) {
+    for (Eigen::Index c = 0; c < s->scores.cols(); ++c) {
+      steps.push_back(stored_steps(s->scores(function, c)));
+    }
+  }
+  return pack_floats(steps);
+}
+
+std::vector<const EncodedSequence*> sequences_of(const EncodedClip& clip) {
+  std::vector<const EncodedSequence*> out;
+  for (const EncodedRun& run : clip.runs) {
+    for (const EncodedSequence& s : run.sequences) out.push_back(&s);
+  }
+  return out;
+}
+
+Bytes pack_sequences(const EncodedClip& clip) {
+  ByteWriter out;
+  put_varint(out, clip.runs.size());
+  for (const EncodedRun& run : clip.runs) {
+    put_varint(out, run.sequences.size());
+    put_varint(out, static_cast<std::uint64_t>(run.sequences.front().first));
+    for (const EncodedSequence& s : run.sequences) {
+      put_varint(out, static_cast<std::uint64_t>(s.last - s.first));
+      for (const std::int8_t a : s.warp.coefficients()) out.put(a);
+    }
+  }
+  return std::move(out).take();
+}
+
+// Runs and sequences without their scores. Together they must hold the frames of the clip once.
+void unpack_sequences(ByteReader in, EncodedClip& clip) {
+  const std::size_t runs = get_count(in, 2, "runs");
+  std::int64_t next = 0;
+  for (std::size_t r = 0; r < runs; ++r) {
+    EncodedRun& run = clip.runs.emplace_back();
+    const std::size_t count = get_count(in, 1 + Warp::terms, "sequences");
+    const std::uint64_t first = get_varint(in);
+    if (count == 0 || first != static_cast<std::uint64_t>(next))
+      in.fail("a run out of place", "runs that follow each other");
+    std::int64_t at = next;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::uint64_t length = get_varint(in);
+      if (length > static_cast<std::uint64_t>(clip.frames))
+        in.fail("a sequence beyond the clip's end", "frames of the clip");
+      Warp::Coefficients coefficients{};
+      for (std::int8_t& a : coefficients) a = in.get<std::int8_t>();
+      if (!Warp::legal(coefficients)) in.fail("a time warp that is not monotone", "slopes within [1/2, 2]");
+      EncodedSequence s{.first = static_cast<int>(at),
+                        .last = static_cast<int>(at + static_cast<std::int64_t>(length)),
+                        .warp = Warp(coefficients)};
+      at = s.last;
+      if (at >= clip.frames || (length == 0 && count > 1))
+        in.fail("a sequence beyond the clip's end", "frames of the clip");
+      run.sequences.push_back(std::move(s));
+    }
+    next = at + 1;
+  }
+  if (next != clip.frames) in.fail(fmt::format("sequences of {} frames", next), fmt::format("{} frames", clip.frames));
+  in.expect_end();
+}
+
+Bytes pack_side(const EncodedClip& clip) {
+  ByteWriter out;
+  put_vector3(out, clip.placement.start_cm);
+  out.put(clip.placement.heading_rad);
+  for (const EncodedRun& run : clip.runs) {
+    out.put_array(std::span<const float>(run.start.data(), 3));
+    for (const EncodedSequence& s : run.sequences) out.put_array(std::span<const float>(s.travel.data(), 3));
+  }
+  out.put_bytes(pack_side_tracks(clip.side_tracks));
+  return std::move(out).take();
+}
+
+void unpack_side(ByteReader in, EncodedClip& clip, const Skeleton& skeleton, const std::string& source) {
+  const auto get3f = [&in] {
+    Eigen::Vector3f v;
+    for (int i = 0; i < 3; ++i) v(i) = in.get<float>();
+    if (!v.allFinite()) in.fail("a position that is no number", "finite values");
+    return v;
+  };
+  clip.placement.start_cm = get_vector3(in);
+  clip.placement.heading_rad = in.get<double>();
+  if (!std::isfinite(clip.placement.heading_rad)) in.fail("a heading that is no number", "a finite angle");
+  for (EncodedRun& run : clip.runs) {
+    run.start = get3f();
+    for (EncodedSequence& s : run.sequences) s.travel = get3f();
+  }
+  clip.side_tracks = unpack_side_tracks(in.take(in.remaining()), clip.frames, skeleton, source);
+}
+
+Bytes one_section(const char* kind, const char* name, Bytes content) {
+  BitstreamWriter out(kind);
+  out.add_section(name, std::move(content));
+  return out.finish();
+}
+
+}  // namespace
+
+Bytes pack_skeleton(const Skeleton& skeleton) {
+  ByteWriter out;
+  put_varint(out, static_cast<std::uint64_t>(skeleton.joint_count()));
+  for (const Joint& joint : skeleton.joints) {
+    put_short_string(out, joint.name);
+    put_varint(out, static_cast<std::uint64_t>(joint.parent + 1));
+    put_vector3(out, joint.offset);
+    out.put(static_cast<std::uint8_t>(joint.channels.size()));
+    for (const Channel c : joint.channels) out.put(static_cast<std::uint8_t>(c));
+    out.put(static_cast<std::uint8_t>(joint.end_site ? 1 : 0));
+    if (joint.end_site) put_vector3(out, *joint.end_site);
+  }
+  return one_section("skeleton", "joints", std::move(out).take());
+}
+
+Skeleton unpack_skeleton(std::span<const std::byte> bytes, const std::string& source) {
+  const Bitstream stream = Bitstream::parse(bytes, source);
+  stream.require_kind("skeleton");
+  ByteReader in(stream.section("joints"), source);
+  Skeleton out;
+  const std::size_t count = get_count(in, 28, "joints");
+  if (count == 0 || count > most_joints) in.fail(fmt::format("{} joints", count), fmt::format("1 to {}", most_joints));
+  for (std::size_t j = 0; j < count; ++j) {
+    Joint joint;
+    joint.name = get_short_string(in);
+    const std::uint64_t parent = get_varint(in);
+    if (parent > j || (parent == 0) != (j == 0)) in.fail("a joint before its parent", "parents first, one root");
+    joint.parent = static_cast<int>(parent) - 1;
+    joint.offset = get_vector3(in);
+    const auto channels = in.get<std::uint8_t>();
+    if (channels > 6) in.fail("a joint with too many channels", "at most 6");
+    for (int c = 0; c < channels; ++c) {
+      const auto channel = in.get<std::uint8_t>();
+      if (channel > 5) in.fail("an unknown channel", "0 to 5");
+      joint.channels.push_back(static_cast<Channel>(channel));
+    }
+    if (in.get<std::uint8_t>() != 0) joint.end_site = get_vector3(in);
+    out.joints.push_back(std::move(joint));
+  }
+  in.expect_end();
+  return out;
+}
+
+Bytes pack_space(const MotionSpace& space) {
+  BitstreamWriter out("motion-space");
+  out.set_option("grouping", static_cast<std::int64_t>(space.options_.grouping));
+  out.set_option("points", static_cast<std::int64_t>(space.points_));
+  out.set_option("variance_share", space.options_.variance_share);
+  if (space.options_.functions) out.set_option("functions", static_cast<std::int64_t>(*space.options_.functions));
+  out.set_option("smooth", static_cast<std::int64_t>(space.options_.smooth ? 1 : 0));
+  out.add_section("skeleton", pack_skeleton(space.skeleton_));
+  ByteWriter references;
+  put_matrix(references, space.references_);
+  out.add_section("references", std::move(references).take());
+  for (std::size_t g = 0; g < space.groups_.size(); ++g) {
+    out.add_section(group_name(g), group_section(space.groups_[g], space.moments_[g]));
+  }
+  return out.finish();
+}
+
+MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& source) {
+  const Bitstream stream = Bitstream::parse(bytes, source);
+  stream.require_kind("motion-space");
+  MotionSpaceOptions options;
+  options.grouping = static_cast<Grouping>(stream.integer_option("grouping", 0, 2));
+  const int points = static_cast<int>(stream.integer_option("points", 4, most_points));
+  options.points = points;
+  options.variance_share = stream.number_option("variance_share", 1e-9, 1);
+  if (stream.find_option("functions") != nullptr) {
+    options.functions = static_cast<int>(stream.integer_option("functions", 1, most_points));
+  }
+  options.smooth = stream.integer_option("smooth", 0, 1) == 1;
+  MotionSpace space(unpack_skeleton(stream.section("skeleton"), source), options, points);
+  ByteReader references(stream.section("references"), source);
+  space.set_references(get_matrix(references, 4, space.layout().joint_count()));
+  references.expect_end();
+  for (int g = 0; g < space.group_count(); ++g) {
+    auto [group, moments] = parse_group(stream.section(group_name(static_cast<std::size_t>(g))), points, source);
+    space.groups_.push_back(std::move(group));
+    space.moments_.push_back(std::move(moments));
+  }
+  return space;
+}
+
+PackedClip pack_clip(const EncodedClip& clip, const MotionSpace& space) {
+  PackedClip out;
+  BitstreamWriter vectors("clip-vectors");
+  const auto sequences = sequences_of(clip);
+  std::vector<Bytes> blocks;
+  for (Eigen::Index k = 0; k < space.functions(); ++k) blocks.push_back(score_block(sequences, k));
+  vectors.set_error(clip.error);
+  vectors.add_progressive_section("scores", blocks);
+  out.vectors = vectors.finish();
+  out.warps = one_section("clip-warps", "sequences", pack_sequences(clip));
+  out.side = one_section("clip-side", "side", pack_side(clip));
+  return out;
+}
+
+void round_to_stored(EncodedClip& clip) {
+  for (EncodedRun& run : clip.runs) {
+    for (EncodedSequence& s : run.sequences) {
+      for (Eigen::Index i = 0; i < s.scores.size(); ++i) {
+        float& score = s.scores.data()[i];
+        score = stored_steps(score) * static_cast<float>(score_step);
+      }
+    }
+  }
+}
+
+EncodedClip unpack_clip(const PackedClip& packed, const MotionSpace& space, const Skeleton& skeleton,
+                        const EncodedClip& header, const std::string& source, int functions) {
+  EncodedClip clip{.name = header.name, .rate_hz = header.rate_hz, .frames = header.frames};
+  const Bitstream warps = Bitstream::parse(packed.warps, source);
+  warps.require_kind("clip-warps");
+  unpack_sequences(ByteReader(warps.section("sequences"), source), clip);
+  const Bitstream side = Bitstream::parse(packed.side, source);
+  side.require_kind("clip-side");
+  unpack_side(ByteReader(side.section("side"), source), clip, skeleton, source);
+
+  const Bitstream vectors = Bitstream::parse_prefix(packed.vectors, source);
+  vectors.require_kind("clip-vectors");
+  clip.error = vectors.error();
+  auto blocks = vectors.blocks("scores");
+  if (blocks.size() > static_cast<std::size_t>(space.functions())) {
+    throw Error(ErrorKind::bad_input, {.file = source,
+                                       .found = fmt::format("{} functions", blocks.size()),
+                                       .expected = fmt::format("{}, as the space has", space.functions())});
+  }
+  if (functions >= 0 && static_cast<std::size_t>(functions) < blocks.size())
+    blocks.resize(static_cast<std::size_t>(functions));
+  const auto curves = static_cast<std::size_t>(space.curves());
+  const auto count = static_cast<std::size_t>(clip.sequence_count());
+  for (EncodedRun& run : clip.runs) {
+    for (EncodedSequence& s : run.sequences) s.scores = ScoreMatrix::Zero(space.functions(), space.curves());
+  }
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    const std::vector<float> steps = unpack_floats(blocks[k], count * curves, source);
+    std::size_t at = 0;
+    for (EncodedRun& run : clip.runs) {
+      for (EncodedSequence& s : run.sequences) {
+        auto row = s.scores.row(static_cast<Eigen::Index>(k));
+        row = Eigen::Map<const Eigen::RowVectorXf>(steps.data() + at, row.size()) * static_cast<float>(score_step);
+        if (!row.allFinite()) throw Error(ErrorKind::bad_input, {.file = source, .found = "a score that is no number"});
+        at += curves;
+      }
+    }
+  }
+  return clip;
+}
+
+namespace {
+
+constexpr int frames_per_part = 65536;
+using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+int parts_of(int frames) {
+  return (frames - 1) / frames_per_part + 1;
+}
+
+int rows_of_part(int frames, int part) {
+  return std::min(frames_per_part, frames - part * frames_per_part);
+}
+
+void put_rows(ByteWriter& out, const SampleMatrix& values, int part) {
+  const int rows = rows_of_part(static_cast<int>(values.rows()), part);
+  const FloatRows some = values.middleRows(part * frames_per_part, rows).cast<float>();
+  out.put_array(std::span<const float>(some.data(), static_cast<std::size_t>(some.size())));
+}
+
+void get_rows(ByteReader& in, int part, SampleMatrix& values) {
+  const int rows = rows_of_part(static_cast<int>(values.rows()), part);
+  const auto numbers =
+      in.get_array<float>(static_cast<std::uint64_t>(rows) * static_cast<std::uint64_t>(values.cols()));
+  in.expect_end();
+  values.middleRows(part * frames_per_part, rows) =
+      Eigen::Map<const FloatRows>(numbers.data(), rows, values.cols()).cast<double>();
+}
+
+void put_head(ByteWriter& out, const PreparedClip& clip) {
+  put_short_string(out, clip.curves.name);
+  out.put(clip.curves.rate_hz);
+  put_vector3(out, clip.curves.placement.start_cm);
+  out.put(clip.curves.placement.heading_rad);
+  put_varint(out, static_cast<std::uint64_t>(clip.curves.frames()));
+  put_varint(out, clip.runs.size());
+  for (const Run& run : clip.runs) {
+    put_varint(out, run.cuts.size());
+    for (const int frame : run.cuts) put_varint(out, static_cast<std::uint64_t>(frame));
+  }
+  const Bytes skeleton = pack_skeleton(clip.skeleton);
+  put_varint(out, skeleton.size());
+  out.put_bytes(skeleton);
+  const Bytes tracks = pack_side_tracks(clip.curves.side_tracks);
+  put_varint(out, tracks.size());
+  out.put_bytes(tracks);
+}
+
+// All but the values; room for these is made where they are known to be there.
+PreparedClip get_head(ByteReader& in, const std::string& source, int& frame_count) {
+  PreparedClip out;
+  out.curves.name = get_short_string(in);
+  out.curves.rate_hz = in.get<double>();
+  out.curves.placement.start_cm = get_vector3(in);
+  out.curves.placement.heading_rad = in.get<double>();
+  const std::uint64_t frames = get_varint(in);
+  if (frames < 1 || frames > std::numeric_limits<int>::max()) in.fail("no number of frames", "1 to 2147483647");
+  const std::size_t runs = get_count(in, 1, "runs");
+  for (std::size_t r = 0; r < runs; ++r) {
+    Run& run = out.runs.emplace_back();
+    const std::size_t cuts = get_count(in, 1, "cuts");
+    for (std::size_t i = 0; i < cuts; ++i) {
+      const std::uint64_t frame = get_varint(in);
+      if (frame >= frames) in.fail("a cut beyond the end", "frames of the clip");
+      run.cuts.push_back(static_cast<int>(frame));
+    }
+    if (cuts == 0) in.fail("a run without frames", "one frame or more");
+    if (!std::ranges::is_sorted(run.cuts, std::less_equal<>{})) in.fail("cuts out of order", "ascending frames");
+  }
+  out.skeleton = unpack_skeleton(get_part(in, "bytes"), source);
+  out.curves.side_tracks = unpack_side_tracks(get_part(in, "bytes"), static_cast<int>(frames), out.skeleton, source);
+  frame_count = static_cast<int>(frames);
+  return out;
+}
+
+}  // namespace
+
+int prepared_parts(const PreparedClip& clip) {
+  return parts_of(clip.curves.frames());
+}
+
+Bytes pack_prepared(const PreparedClip& clip, int part) {
+  ByteWriter out;
+  if (part == 0) put_head(out, clip);
+  put_rows(out, clip.curves.values, part);
+  return one_section("prepared-clip", "clip", std::move(out).take());
+}
+
+std::optional<PreparedClip> unpack_prepared(const std::function<std::optional<Bytes>(int part)>& part_of,
+                                            const std::string& source) {
+  PreparedClip out;
+  int parts = 1;
+  for (int part = 0; part < parts; ++part) {
+    const std::optional<Bytes> bytes = part_of(part);
+    if (!bytes) return std::nullopt;
+    const Bitstream stream = Bitstream::parse(*bytes, source);
+    stream.require_kind("prepared-clip");
+    ByteReader in(stream.section("clip"), source);
+    if (part == 0) {
+      int frames = 0;
+      out = get_head(in, source, frames);
+      const int curves = curve_layout(out.skeleton).curve_count();
+      const auto first_values = static_cast<std::size_t>(rows_of_part(frames, 0)) * static_cast<std::size_t>(curves);
+      if (in.remaining() != first_values * sizeof(float)) in.fail("another number of values", "those of its frames");
+      parts = parts_of(frames);
+      if (parts > 1 && !part_of(parts - 1)) return std::nullopt;
+      out.curves.values.resize(frames, curves);
+    }
+    get_rows(in, part, out.curves.values);
+  }
+  return out;
+}
+
+}  // namespace kinespace

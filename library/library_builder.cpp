@@ -1,0 +1,422 @@
+#include "kinespace/library/library_builder.h"
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/library/detail/space_codec.h"
+#include "kinespace/library/library_view.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/plausibility.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/storage/library_build.h"
+
+namespace kinespace {
+namespace {
+
+constexpr int clips_per_block = 16;
+constexpr int importer_version = 2;  // raise it when imports of the same file would come out otherwise
+
+// Everything that an import depends on besides its file.
+std::string fingerprint_of(const LibraryBuilderOptions& options) {
+  const SequenceOptions& s = options.space.sequences;
+  return fmt::format("importer {} sequences {} {} {} {} {} {}", importer_version, s.shortest_s, s.longest_s,
+                     s.length_weight, s.jerk_weight, s.break_cm, s.break_ratio);
+}
+
+// One file on its way into the library.
+struct Import {
+  std::filesystem::path file;
+  std::string name;
+  std::string source_hash;  // of the file and, for AMC, its skeleton file
+  std::string tree_hash;
+  std::vector<Doubt> doubts;
+};
+
+// Part 0 is kept under the hash itself, and last: where it is, the others are.
+std::string part_key(const std::string& source_hash, int part) {
+  return part == 0 ? source_hash : fmt::format("{} part {}", source_hash, part);
+}
+
+// nullopt when there is none, or when a part of it is gone or damaged.
+std::optional<PreparedClip> kept_import(const Import& import, const LibraryBuild& build) {
+  return unpack_prepared([&](int part) { return build.find_import(part_key(import.source_hash, part)); },
+                         import.file.string());
+}
+
+// Reads a file unless an earlier build did, and keeps what came of it. True when it was there already.
+bool import_file(Import& import, const LibraryBuilderOptions& options, LibraryBuild& build) {
+  import.source_hash = source_hash_of(import.file, options.asf);
+  if (const auto known = kept_import(import, build)) {
+    import.tree_hash = known->skeleton.tree_hash();
+    import.doubts = doubts_about(clip_from_curves(known->curves, known->skeleton));
+    return true;
+  }
+  Clip read = read_clip(import.file, options.asf);
+  import.doubts = doubts_about(read);
+  const PreparedClip clip = prepare(std::move(read), options.space.sequences);
+  import.tree_hash = clip.skeleton.tree_hash();
+  for (int part = prepared_parts(clip); part-- > 0;) {
+    build.keep_import(part_key(import.source_hash, part), pack_prepared(clip, part));
+  }
+  return false;
+}
+
+int import_files(std::vector<Import>& imports, const LibraryBuilderOptions& options, LibraryBuild& build,
+                 const Progress& progress) {
+  // Of an earlier build only: two files of one content in this one are no resuming.
+  const std::vector<std::string> keys = build.import_keys();
+  const std::set<std::string> from_before(keys.begin(), keys.end());
+  std::vector<char> known(imports.size(), 0);
+  const int count = static_cast<int>(imports.size());
+  for (int start = 0; start < count; start += clips_per_block) {
+    progress.check_stop();
+    progress.at("import", static_cast<double>(start) / count);
+    const int in_block = std::min(clips_per_block, count - start);
+    tbb::parallel_for(0, in_block, [&](int i) {
+      Import& import = imports[static_cast<std::size_t>(start + i)];
+      const bool was_there = import_file(import, options, build);
+      known[static_cast<std::size_t>(start + i)] = was_there && from_before.contains(import.source_hash) ? 1 : 0;
+    });
+  }
+  progress.at("import", 1);
+  return static_cast<int>(std::ranges::count(known, 1));
+}
+
+// A line a kind: the first clip that it is about, and how many others.
+std::vector<std::string> doubts_of(const std::vector<Import>& imports) {
+  std::vector<std::string> out;
+  for (const DoubtKind kind : {DoubtKind::height, DoubtKind::axis, DoubtKind::floor}) {
+    std::string line;
+    int others = -1;
+    for (const Import& import : imports) {
+      const auto found = std::ranges::find(import.doubts, kind, &Doubt::kind);
+      if (found == import.doubts.end()) continue;
+      if (++others == 0) line = import.file.string() + ": " + found->text;
+    }
+    if (others > 0) line += fmt::format(" (and so with {} other{})", others, others == 1 ? "" : "s");
+    if (!line.empty()) out.push_back(std::move(line));
+  }
+  return out;
+}
+
+PreparedSource source_of_imports(const std::vector<const Import*>& imports, const LibraryBuild& build) {
+  return {static_cast<int>(imports.size()), [&imports, &build](int i) {
+            const Import& import = *imports[static_cast<std::size_t>(i)];
+            std::optional<PreparedClip> clip = kept_import(import, build);
+            if (!clip) {
+              throw Error(ErrorKind::machine, {.file = import.file.string(),
+                                               .found = "its import is gone",
+                                               .expected = "the partial library to stay",
+                                               .remedy = "build again"});
+            }
+            clip->curves.name = import.name;
+            return *std::move(clip);
+          }};
+}
+
+// Of the joints of two clips, part by part.
+class JointDistance {
+ public:
+  void add(const JointPositions& a, const JointPositions& b) {
+    for (std::size_t i = 0; i < a.values.size(); ++i) {
+      const double e = (a.values[i] - b.values[i]).norm();
+      sum_ += e;
+      worst_ = std::max(worst_, e);
+    }
+    count_ += a.values.size();
+  }
+  [[nodiscard]] MeasuredError error() const {
+    return {.mean_joint_error_cm = sum_ / static_cast<double>(count_), .max_joint_error_cm = worst_};
+  }
+
+ private:
+  double sum_ = 0;
+  double worst_ = 0;
+  std::size_t count_ = 0;
+};
+
+MeasuredError distance(const JointPositions& a, const JointPositions& b) {
+  JointDistance out;
+  out.add(a, b);
+  return out.error();
+}
+
+MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, const EncodedClip& encoded) {
+  JointDistance out;
+  decode_in_parts(space, encoded, -1, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
+    const auto original = clip.curves.values.middleRows(first, rows.rows());
+    out.add(joint_positions(clip_of_frames(clip.curves, original, first, clip.skeleton)),
+            joint_positions(clip_of_frames(clip.curves, rows, first, clip.skeleton)));
+  });
+  return out.error();
+}
+
+// What a space does with the clips of one joint tree.
+class SpaceWriter {
+ public:
+  SpaceWriter(Library& library, const BuiltSpace& built, const ClipSpace& clips, const std::string& tree_hash,
+              const Compute& compute)
+      : library_(library), built_(built), clips_(clips), tree_hash_(tree_hash), compute_(compute) {
+    space_id_ = library.put_space(
+        {.name = sequence_space_name(tree_hash), .tree_hash = tree_hash, .blob = pack_space(built.space)});
+    library.put_space({.name = clip_space_name(tree_hash), .tree_hash = tree_hash, .blob = clips.pack()});
+  }
+  [[nodiscard]] std::int64_t space_id() const { return space_id_; }
+
+  void write(const std::vector<const Import*>& imports, const PreparedSource& source, LibraryReport& report,
+             const Progress& progress) {
+    for (int start = 0; start < source.count; start += clips_per_block) {
+      progress.check_stop();
+      progress.at("encode", static_cast<double>(start) / source.count);
+      const int count = std::min(clips_per_block, source.count - start);
+      std::vector<Ready> ready(static_cast<std::size_t>(count));
+      tbb::parallel_for(0, count,
+                        [&](int i) { ready[static_cast<std::size_t>(i)] = make(source.load(start + i), start + i); });
+      for (int i = 0; i < count; ++i)
+        add(*imports[static_cast<std::size_t>(start + i)], ready[static_cast<std::size_t>(i)], report);
+    }
+    progress.at("encode", 1);
+  }
+
+ private:
+  struct Ready {
+    Skeleton skeleton;
+    EncodedClip clip;
+    std::vector<float> retrieval;
+  };
+
+  [[nodiscard]] Ready make(PreparedClip prepared, int index) const {
+    Ready out;
+    built_.space.apply_references(prepared.curves.values);
+    out.clip =
+        encode(built_.space, prepared.curves, prepared.runs, built_.warps[static_cast<std::size_t>(index)], compute_);
+    round_to_stored(out.clip);
+    out.clip.error = measure_error(prepared, built_.space, out.clip);
+    out.retrieval = clips_.vector_of(prepared.curves);
+    out.skeleton = std::move(prepared.skeleton);
+    return out;
+  }
+
+  void add(const Import& import, const Ready& ready, LibraryReport& report) {
+    const std::int64_t skeleton_id = library_.add_skeleton(
+        {.name = import.file.filename().string(), .tree_hash = tree_hash_, .blob = pack_skeleton(ready.skeleton)});
+    const ClipRow row{.space_id = space_id_,
+                      .skeleton_id = skeleton_id,
+                      .name = import.name,
+                      .source = import.file.string(),
+                      .source_hash = import.source_hash,
+                      .rate_hz = ready.clip.rate_hz,
+                      .frames = ready.clip.frames,
+                      .labels = labels_of(import.name)};
+    store_clip(library_, row, ready.clip, built_.space, ready.retrieval, false);
+    const double weight = static_cast<double>(row.frames);
+    report.mean_joint_error_cm += weight * ready.clip.error.mean_joint_error_cm;
+    report.max_joint_error_cm = std::max(report.max_joint_error_cm, ready.clip.error.max_joint_error_cm);
+    report.sequences += ready.clip.sequence_count();
+    report.frames += row.frames;
+    ++report.added;
+  }
+
+  Library& library_;
+  const BuiltSpace& built_;
+  const ClipSpace& clips_;
+  std::string tree_hash_;
+  const Compute& compute_;
+  std::int64_t space_id_ = 0;
+};
+
+// Puts the clips that are there already into the extended spaces.
+void transfer_clips(Library& library, std::int64_t space_id, const MotionSpace& from, const MotionSpace& to,
+                    const ClipSpace& clips_from, const ClipSpace& clips_to) {
+  for (const ClipRow& row : library.clips()) {
+    if (row.space_id != space_id) continue;
+    const Skeleton skeleton = unpack_skeleton(library.skeleton(row.skeleton_id).blob, row.name);
+    const PackedClip packed{library.clip_blob(row.id, ClipBlob::vectors), library.clip_blob(row.id, ClipBlob::warps),
+                            library.clip_blob(row.id, ClipBlob::side)};
+    EncodedClip clip =
+        unpack_clip(packed, from, skeleton,
+                    {.name = row.name, .rate_hz = row.rate_hz, .frames = static_cast<int>(row.frames)}, row.name);
+    const JointPositions before = joint_positions(clip_from_curves(decode(from, clip), skeleton));
+    for (EncodedRun& run : clip.runs) {
+      for (EncodedSequence& s : run.sequences) s.scores = to.transfer(s.scores, from);
+    }
+    round_to_stored(clip);
+    // Its own curves are not there any more; with what the transfer moves added, its error is never less than it is.
+    const MeasuredError moved = distance(before, joint_positions(clip_from_curves(decode(to, clip), skeleton)));
+    clip.error.mean_joint_error_cm += moved.mean_joint_error_cm;
+    clip.error.max_joint_error_cm += moved.max_joint_error_cm;
+    const std::vector<float> old_vector = library.retrieval_vector(row.id);
+    const Eigen::Map<const ScoreMatrix> old_scores(old_vector.data(), clips_from.space().functions(),
+                                                   clips_from.space().curves());
+    const ScoreMatrix scores = clips_to.space().transfer(old_scores, clips_from.space());
+    store_clip(library, row, clip, to, {scores.data(), scores.data() + scores.size()}, true);
+  }
+}
+
+void require_one_tree(const std::map<std::string, std::vector<const Import*>>& by_tree,
+                      const LibraryBuilderOptions& options) {
+  if (options.by_skeleton || by_tree.size() < 2) return;
+  const Import& a = *by_tree.begin()->second.front();
+  const Import& b = *std::next(by_tree.begin())->second.front();
+  throw Error(ErrorKind::bad_input, {.file = b.file.string(),
+                                     .found = "another joint tree than that of " + a.file.string(),
+                                     .expected = "clips of one skeleton (bone lengths may differ)",
+                                     .remedy = "build them apart, or give --by-skeleton for one space each"});
+}
+
+// The spaces of one joint tree: new ones, or the library's own extended by the new clips.
+void build_tree(const std::string& tree_hash, const std::vector<const Import*>& imports,
+                const LibraryBuilderOptions& options, LibraryBuild& build, const Compute& compute,
+                const Progress& progress, LibraryReport& report) {
+  Library& library = build.library();
+  const PreparedSource source = source_of_imports(imports, build);
+  std::optional<SpaceRow> old_space, old_clips;
+  for (const SpaceRow& row : library.spaces()) {
+    if (row.name == sequence_space_name(tree_hash)) old_space = library.space(row.id);
+    if (row.name == clip_space_name(tree_hash)) old_clips = library.space(row.id);
+  }
+  if (old_space && old_clips) {
+    const std::string name = build.target().string();
+    const MotionSpace from = unpack_space(old_space->blob, name);
+    const ClipSpace clips_from = ClipSpace::unpack(old_clips->blob, name);
+    const BuiltSpace built = extend_space(from, source, options.space, compute, progress);
+    const ClipSpace clips = clips_from.extend(source, progress);
+    SpaceWriter writer(library, built, clips, tree_hash, compute);
+    transfer_clips(library, writer.space_id(), from, built.space, clips_from, clips);
+    writer.write(imports, source, report, progress);
+  } else {
+    const BuiltSpace built = build_space(source, options.space, compute, progress);
+    const ClipSpace clips = ClipSpace::build(source, built.space.references(), options.clips, progress);
+    SpaceWriter(library, built, clips, tree_hash, compute).write(imports, source, report, progress);
+  }
+}
+
+// Files that are in the library already, with the same name and content, need nothing.
+int drop_unchanged(std::vector<Import>& imports, const Library& library, const LibraryBuilderOptions& options) {
+  const std::size_t before = imports.size();
+  std::erase_if(imports, [&](const Import& import) {
+    const auto row = library.find_clip(import.name);
+    return row && row->source_hash == source_hash_of(import.file, options.asf);
+  });
+  return static_cast<int>(before - imports.size());
+}
+
+void summarise(Library& library, LibraryReport& report) {
+  const std::int64_t sequences = report.sequences + library.metadata_count("sequences").value_or(0);
+  library.set_metadata("sequences", std::to_string(sequences));
+  report.sequences = static_cast<int>(sequences);
+  report.variance = 1;
+  for (const SpaceRow& row : library.spaces()) {
+    if (!row.name.starts_with("sequences ")) continue;
+    const MotionSpace space = unpack_space(library.space(row.id).blob, row.name);
+    ++report.spaces;
+    report.functions = std::max(report.functions, space.functions());
+    report.variance = std::min(report.variance, space.variance_covered());
+  }
+  library.set_metadata("functions", std::to_string(report.functions));
+  library.set_metadata("variance", fmt::format("{:.9f}", report.variance));
+  report.clips = static_cast<int>(library.totals().clips);
+}
+
+}  // namespace
+
+std::vector<std::filesystem::path> find_motion_files(const std::vector<std::filesystem::path>& arguments) {
+  std::set<std::filesystem::path> files;
+  for (const auto& argument : arguments) {
+    if (std::filesystem::is_directory(argument)) {
+      for (const auto& entry : std::filesystem::recursive_directory_iterator(argument)) {
+        if (entry.is_regular_file() && is_motion_file(entry.path())) files.insert(entry.path());
+      }
+    } else if (!std::filesystem::exists(argument)) {
+      throw Error(ErrorKind::bad_input, {.file = argument.string(),
+                                         .found = "no such file or folder",
+                                         .expected = "a motion file or a folder of them",
+                                         .remedy = "check the path"});
+    } else if (is_motion_file(argument)) {
+      files.insert(argument);
+    } else {
+      throw Error(ErrorKind::bad_input, {.file = argument.string(),
+                                         .found = "not a motion file by its ending",
+                                         .expected = ".bvh or .amc",
+                                         .remedy = "name clips, or folders that hold them"});
+    }
+  }
+  if (files.empty()) {
+    throw Error(ErrorKind::bad_input, {.file = arguments.empty() ? "" : arguments.front().string(),
+                                       .found = "no motion files",
+                                       .expected = "at least one .bvh or .amc"});
+  }
+  return {files.begin(), files.end()};
+}
+
+std::vector<std::string> clip_names(const std::vector<std::filesystem::path>& files) {
+  std::vector<std::string> names(files.size());
+  std::vector<std::filesystem::path> rest(files.size());
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    names[i] = files[i].stem().string();
+    rest[i] = files[i].parent_path();
+  }
+  for (bool clash = true; clash;) {
+    std::map<std::string, int> uses;
+    for (const std::string& name : names) ++uses[name];
+    clash = false;
+    for (std::size_t i = 0; i < files.size(); ++i) {
+      const std::string folder = rest[i].filename().string();
+      if (uses[names[i]] < 2 || folder.empty()) continue;
+      names[i] = folder + "/" + names[i];
+      rest[i] = rest[i].parent_path();
+      clash = true;
+    }
+  }
+  return names;
+}
+
+std::vector<std::string> labels_of(const std::string& name) {
+  std::vector<std::string> out;
+  const std::string stem = name.substr(name.rfind('/') + 1);
+  for (std::size_t at = 0; at <= stem.size();) {
+    const std::size_t end = std::min(stem.find('_', at), stem.size());
+    const std::string part = stem.substr(at, end - at);
+    const bool number = std::ranges::all_of(part, [](unsigned char c) { return std::isdigit(c) != 0; });
+    if (!number) out.push_back(part);
+    at = end + 1;
+  }
+  return out;
+}
+
+LibraryReport build_library(const std::vector<std::filesystem::path>& files, const std::filesystem::path& target,
+                            const LibraryBuilderOptions& options, const Compute& compute, const Progress& progress) {
+  options.space.validate();
+  options.clips.validate();
+  for (const auto& file : files) require_different_files(file, target);
+  const std::vector<std::string> names = clip_names(files);
+  std::vector<Import> imports(files.size());
+  for (std::size_t i = 0; i < files.size(); ++i) imports[i] = {.file = files[i], .name = names[i]};
+
+  LibraryReport report;
+  LibraryBuild build(target, {.fingerprint = fingerprint_of(options), .extend = options.add});
+  if (options.add) report.unchanged = drop_unchanged(imports, Library::open_read_only(target), options);
+  report.resumed = import_files(imports, options, build, progress);
+  report.doubts = doubts_of(imports);
+
+  std::map<std::string, std::vector<const Import*>> by_tree;
+  for (const Import& import : imports) by_tree[import.tree_hash].push_back(&import);
+  require_one_tree(by_tree, options);
+  for (const auto& [tree_hash, members] : by_tree)
+    build_tree(tree_hash, members, options, build, compute, progress, report);
+  if (report.frames > 0) report.mean_joint_error_cm /= static_cast<double>(report.frames);
+  summarise(build.library(), report);
+  build.finish();
+  report.bytes = static_cast<std::int64_t>(std::filesystem::file_size(target));
+  return report;
+}
+
+}  // namespace kinespace

@@ -1,0 +1,58 @@
+// From files to a library: read, cut, align, analyse, store. What `kinespace build` does.
+//
+// Clips are read and made ready one by one and kept in the partial file beside the target, so that memory does not grow
+// with the library and a build that was stopped goes on where it was. The target is replaced in one step at the end.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kinespace/base/progress.h"
+#include "kinespace/fpca/clip_space.h"
+#include "kinespace/fpca/space_builder.h"
+#include "kinespace/kernels/device.h"
+
+namespace kinespace {
+
+struct LibraryBuilderOptions {
+  SpaceBuildOptions space;
+  ClipSpaceOptions clips;
+  bool by_skeleton = false;                  // one space for each joint tree, instead of an error
+  bool add = false;                          // extend the library that is there
+  std::optional<std::filesystem::path> asf;  // the skeleton of AMC files; else found beside them
+};
+
+struct LibraryReport {
+  int clips = 0;  // in the library now
+  int added = 0;
+  int unchanged = 0;  // already there (same content), when adding
+  int resumed = 0;    // taken from a build that was stopped
+  int sequences = 0;
+  int spaces = 0;
+  int functions = 0;               // of the largest space
+  double variance = 0;             // share covered, least of all spaces
+  double mean_joint_error_cm = 0;  // of decoding the added clips with all functions
+  double max_joint_error_cm = 0;
+  std::int64_t frames = 0;
+  std::int64_t bytes = 0;
+  std::vector<std::string> doubts;  // what looks wrong in clips (motion/plausibility.h), a line a kind
+};
+
+// Every motion file among the arguments: files as they are, folders with all below them; sorted, each once. Throws
+// Error{bad_input} for what is not there and when nothing is found.
+[[nodiscard]] std::vector<std::filesystem::path> find_motion_files(const std::vector<std::filesystem::path>& arguments);
+
+// Names for clips: the file name without its ending; where two are equal, with as many folders in front as tell them
+// apart.
+[[nodiscard]] std::vector<std::string> clip_names(const std::vector<std::filesystem::path>& files);
+
+// What the name says: its parts between underscores that are no numbers ("walk_happy_012" -> walk, happy).
+[[nodiscard]] std::vector<std::string> labels_of(const std::string& name);
+
+[[nodiscard]] LibraryReport build_library(const std::vector<std::filesystem::path>& files,
+                                          const std::filesystem::path& target, const LibraryBuilderOptions& options,
+                                          const Compute& compute = {}, const Progress& progress = {});
+
+}  // namespace kinespace

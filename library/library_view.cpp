@@ -1,0 +1,188 @@
+#include "kinespace/library/library_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/base/nearest_name.h"
+#include "kinespace/library/detail/space_codec.h"
+#include "kinespace/motion/kinematics.h"
+#include "kinespace/motion/read.h"
+#include "kinespace/motion/text.h"
+
+namespace kinespace {
+namespace {
+
+constexpr const char* known_endings[] = {".bvh", ".amc", ".asf", ".glb", ".gltf", ".fbx", ".c3d", ".ksm", ".kspace"};
+
+bool looks_like_a_file(const std::string& name) {
+  const std::string ending = std::filesystem::path(name).extension().string();
+  return name.find('/') != std::string::npos ||
+         std::ranges::any_of(known_endings, [&](const char* known) { return same_word(ending, known); });
+}
+
+double largest_distance(const JointPositions& a, const JointPositions& b) {
+  if (a.values.size() != b.values.size()) return std::numeric_limits<double>::infinity();
+  double largest = 0;
+  for (std::size_t i = 0; i < a.values.size(); ++i) largest = std::max(largest, (a.values[i] - b.values[i]).norm());
+  return largest;
+}
+
+// `known`: how near all functions come.
+[[noreturn]] void refuse_level(const Library& library, const ClipRow& row, const std::string& known, double asked_cm) {
+  const bool nothing = known == "nothing";
+  throw Error(ErrorKind::usage,
+              {.file = library.path().string(),
+               .found = fmt::format("a largest error of {:.3g} cm asked of the clip \"{}\"", asked_cm, row.name),
+               .expected = nothing ? "an error that can be promised: the library does not know how near its functions "
+                                     "come to the clip as it was read, and the file it came from is not there unchanged"
+                                   : fmt::format("at least {}: so near do all its functions come to the clip as it "
+                                                 "was read",
+                                                 known),
+               .remedy = "ask for less with --lod, or build the library with more functions"});
+}
+
+}  // namespace
+
+std::string sequence_space_name(const std::string& tree_hash) {
+  return "sequences " + tree_hash;
+}
+std::string clip_space_name(const std::string& tree_hash) {
+  return "clips " + tree_hash;
+}
+
+std::string source_hash_of(const std::filesystem::path& file, const std::optional<std::filesystem::path>& asf) {
+  std::string hash;
+  for (const auto& part : files_read(file, asf)) hash += hash_of_file(part);
+  return hash;
+}
+
+LibraryView::LibraryView(const std::filesystem::path& path) : library_(Library::open_read_only(path)) {}
+
+ClipRow LibraryView::require_clip(const std::string& name) const {
+  if (auto row = library_.find_clip(name)) return *std::move(row);
+  std::error_code ignored;
+  if (std::filesystem::exists(name, ignored)) {
+    throw Error(ErrorKind::usage, {.file = name,
+                                   .found = "a file or folder",
+                                   .expected = "the name of a clip of " + library_.path().string(),
+                                   .remedy = "`kinespace build --add` adds clips to a library"});
+  }
+  std::vector<std::string> names;
+  for (const ClipRow& row : library_.clips()) names.push_back(row.name);
+  const auto nearest = nearest_name(name, names);
+  const bool file = looks_like_a_file(name);
+  throw Error(
+      file ? ErrorKind::bad_input : ErrorKind::usage,
+      {.file = file ? name : library_.path().string(),
+       .found = file ? "no such file, and no clip of that name in " + library_.path().string()
+                     : fmt::format("no clip \"{}\"", name),
+       .remedy = nearest ? fmt::format("the nearest name is \"{}\"; `kinespace info LIB --limit 0` lists all", *nearest)
+                         : "the library has no clips"});
+}
+
+const MotionSpace& LibraryView::space(std::int64_t space_id) {
+  const auto found = spaces_.find(space_id);
+  if (found != spaces_.end()) return found->second;
+  return spaces_.emplace(space_id, unpack_space(library_.space(space_id).blob, library_.path().string())).first->second;
+}
+
+const ClipSpace& LibraryView::clip_space(std::int64_t space_id) {
+  const auto found = clip_spaces_.find(space_id);
+  if (found != clip_spaces_.end()) return found->second;
+  const std::string wanted = clip_space_name(library_.space(space_id).tree_hash);
+  for (const SpaceRow& row : library_.spaces()) {
+    if (row.name != wanted) continue;
+    return clip_spaces_.emplace(space_id, ClipSpace::unpack(library_.space(row.id).blob, library_.path().string()))
+        .first->second;
+  }
+  throw Error(ErrorKind::bad_input, {.file = library_.path().string(),
+                                     .found = "no index of whole clips",
+                                     .expected = "a space of the name " + wanted,
+                                     .remedy = "build the library again"});
+}
+
+const Skeleton& LibraryView::skeleton(std::int64_t skeleton_id) {
+  const auto found = skeletons_.find(skeleton_id);
+  if (found != skeletons_.end()) return found->second;
+  return skeletons_.emplace(skeleton_id, unpack_skeleton(library_.skeleton(skeleton_id).blob, library_.path().string()))
+      .first->second;
+}
+
+std::optional<std::int64_t> LibraryView::space_for(const Skeleton& skeleton) const {
+  const std::string wanted = sequence_space_name(skeleton.tree_hash());
+  for (const SpaceRow& row : library_.spaces()) {
+    if (row.name == wanted) return row.id;
+  }
+  return std::nullopt;
+}
+
+EncodedClip LibraryView::encoded(const ClipRow& row, int functions) {
+  const PackedClip packed{library_.clip_blob(row.id, ClipBlob::vectors), library_.clip_blob(row.id, ClipBlob::warps),
+                          library_.clip_blob(row.id, ClipBlob::side)};
+  const EncodedClip header{.name = row.name, .rate_hz = row.rate_hz, .frames = static_cast<int>(row.frames)};
+  const std::string source = fmt::format("{} (clip {})", library_.path().string(), row.name);
+  return unpack_clip(packed, space(row.space_id), skeleton(row.skeleton_id), header, source, functions);
+}
+
+ClipCurves LibraryView::curves(const ClipRow& row, int functions) {
+  return decode(space(row.space_id), encoded(row, functions), functions);
+}
+
+Clip LibraryView::clip(const ClipRow& row, int functions) {
+  return clip_from_curves(curves(row, functions), skeleton(row.skeleton_id));
+}
+
+std::optional<Clip> LibraryView::unchanged_source(const ClipRow& row) const {
+  const std::filesystem::path file = row.source;
+  std::error_code ignored;
+  if (!is_motion_file(file) || !std::filesystem::is_regular_file(file, ignored)) return std::nullopt;
+  try {
+    if (source_hash_of(file) != row.source_hash) return std::nullopt;
+    Clip clip = read_clip(file);
+    if (clip.frames != row.frames) return std::nullopt;
+    return clip;
+  } catch (const Error&) {
+    return std::nullopt;  // a skeleton that is not beside it any more, say: then the file is not what it was
+  }
+}
+
+LibraryView::LevelOfDetail LibraryView::level_for_error(const ClipRow& row, double max_error_cm) {
+  const MotionSpace& s = space(row.space_id);
+  const Skeleton& bones = skeleton(row.skeleton_id);
+  const EncodedClip whole = encoded(row);
+  const std::optional<Clip> source = unchanged_source(row);
+  const JointPositions target = joint_positions(source ? *source : clip_from_curves(decode(s, whole), bones));
+  // The library keeps errors as 32-bit floats.
+  const double unseen_cm = source ? 0 : whole.error.max_joint_error_cm * (1 + 1e-6);
+  if (!std::isfinite(unseen_cm)) refuse_level(library_, row, "nothing", max_error_cm);
+  const auto error_of = [&](int n) {
+    return unseen_cm + largest_distance(target, joint_positions(clip_from_curves(decode(s, whole, n), bones)));
+  };
+  // The error falls with n but for small waves, so the first n that is good enough is looked for one by one.
+  double error = unseen_cm;
+  for (int n = 0; n <= s.functions() && unseen_cm <= max_error_cm; ++n) {
+    error = error_of(n);
+    if (error <= max_error_cm) return {n, error, source.has_value()};
+  }
+  refuse_level(library_, row, fmt::format("{:.3g} cm", error), max_error_cm);
+}
+
+void store_clip(Library& library, const ClipRow& row, const EncodedClip& clip, const MotionSpace& space,
+                const std::vector<float>& retrieval, bool replace_blobs) {
+  PackedClip packed = pack_clip(clip, space);
+  const ClipBlobs blobs{std::move(packed.vectors), std::move(packed.warps), std::move(packed.side), retrieval};
+  if (replace_blobs) {
+    library.replace_clip_blobs(row.id, blobs);
+  } else {
+    library.add_clip(row, blobs);
+  }
+}
+
+}  // namespace kinespace

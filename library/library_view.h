@@ -1,0 +1,70 @@
+// A library as motions: its spaces, and its clips decoded at any level of detail.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "kinespace/fpca/clip_space.h"
+#include "kinespace/fpca/encoding.h"
+#include "kinespace/storage/library.h"
+
+namespace kinespace {
+
+// Names of the rows that hold the spaces of one joint tree: "sequences TREE" and "clips TREE".
+[[nodiscard]] std::string sequence_space_name(const std::string& tree_hash);
+[[nodiscard]] std::string clip_space_name(const std::string& tree_hash);
+
+// What ClipRow::source_hash holds: the content_hash of the file, for AMC with that of its skeleton file behind it.
+[[nodiscard]] std::string source_hash_of(const std::filesystem::path& file,
+                                         const std::optional<std::filesystem::path>& asf = {});
+
+class LibraryView {
+ public:
+  explicit LibraryView(const std::filesystem::path& path);
+
+  [[nodiscard]] const Library& library() const { return library_; }
+
+  // The clip of that name. Throws Error{usage} naming the nearest name when there is none.
+  [[nodiscard]] ClipRow require_clip(const std::string& name) const;
+
+  // Loaded on first use and kept.
+  [[nodiscard]] const MotionSpace& space(std::int64_t space_id);
+  [[nodiscard]] const ClipSpace& clip_space(std::int64_t space_id);
+  [[nodiscard]] const Skeleton& skeleton(std::int64_t skeleton_id);
+  // The space for clips of such a skeleton; nullopt when the library has none.
+  [[nodiscard]] std::optional<std::int64_t> space_for(const Skeleton& skeleton) const;
+
+  // With at most `functions` functions (all when < 0).
+  [[nodiscard]] EncodedClip encoded(const ClipRow& row, int functions = -1);
+  [[nodiscard]] ClipCurves curves(const ClipRow& row, int functions = -1);
+  [[nodiscard]] Clip clip(const ClipRow& row, int functions = -1);
+
+  // The fewest functions whose decoded clip is, at every joint and frame, within the given distance in cm of the clip
+  // as it was read. Where the file it was read from is still there unchanged, that is measured; else it is the error
+  // that was measured when the library was built plus the distance from what all functions give, which is never less.
+  // Throws Error{usage} when even all functions do not come that near, or nothing is known of how near they come.
+  struct LevelOfDetail {
+    int functions = 0;
+    double max_error_cm = 0;     // of that level: measured, or a bound
+    bool from_the_file = false;  // measured against it
+  };
+  [[nodiscard]] LevelOfDetail level_for_error(const ClipRow& row, double max_error_cm);
+
+ private:
+  [[nodiscard]] std::optional<Clip> unchanged_source(const ClipRow& row) const;
+
+  Library library_;
+  std::map<std::int64_t, MotionSpace> spaces_;
+  std::map<std::int64_t, ClipSpace> clip_spaces_;
+  std::map<std::int64_t, Skeleton> skeletons_;
+};
+
+// Writes one clip's rows; used by the builder and by whoever adds to a library.
+void store_clip(Library& library, const ClipRow& row, const EncodedClip& clip, const MotionSpace& space,
+                const std::vector<float>& retrieval, bool replace_blobs);
+
+}  // namespace kinespace
