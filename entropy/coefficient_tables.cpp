@@ -4,7 +4,7 @@
 #include <cstdlib>
 
 #include "kinespace/entropy/coefficient_coder.h"
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 
 namespace kinespace {
 namespace {

@@ -12,7 +12,7 @@ namespace {
 constexpr double steps = 8192;  // a leg length; numbers reach to +-4 of them
 
 constexpr std::string_view standard_table =
-#include "footskate/standard_contacts.inc"
+#include "kinespace/footskate/standard_contacts.inc"
     ;
 
 // The value of a letter of base 64; -1: none.

@@ -10,6 +10,8 @@
 #include <fmt/format.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
+#include "kinespace/base/png.h"
 #include "kinespace/mesh/mesh_error.h"
 
 namespace kinespace {
@@ -217,6 +219,14 @@ ComparisonPicture draw_comparison(const MeshSequence& original, const MeshSequen
     for (int x = 0; x < bar; ++x) paint(out.picture.at(3 * options.panel_width + x, y), x < 4 ? paper : colour);
   }
   return out;
+}
+
+std::string format_png(const Picture& picture) {
+  return format_png(picture.width, picture.height, picture.pixels);
+}
+
+void write_png(const std::filesystem::path& path, const Picture& picture) {
+  write_file_atomically(path, format_png(picture));
 }
 
 }  // namespace kinespace

@@ -6,7 +6,7 @@
 #include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 
 namespace kinespace {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "kinespace/base/error.h"
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/mesh/connectivity.h"
 #include "kinespace/mesh_codecs/detail/draco_surface.h"
 #include "kinespace/mesh_codecs/detail/vertex_order.h"

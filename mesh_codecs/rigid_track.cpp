@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "kinespace/base/error.h"
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 
 namespace kinespace {
 namespace {

@@ -120,6 +120,16 @@ CurveLayout curve_layout(const Skeleton& skeleton) {
   return {skeleton.rotating_joints()};
 }
 
+std::vector<SideTrack> side_tracks_of(const Clip& clip) {
+  const int root = curve_layout(clip.skeleton).joints.front();
+  std::vector<SideTrack> out;
+  for (const int j : ancestors_of(clip.skeleton, root)) add_rotation_side_track(clip, j, out);
+  for (const auto& track : clip.translations) {
+    if (track.joint != root) out.push_back(translation_side_track(track));
+  }
+  return out;
+}
+
 void apply_side_track(const SideTrack& track, int first, Clip& clip) {
   const auto after = std::ranges::upper_bound(track.frames, first);
   auto piece = static_cast<std::size_t>(std::max<std::ptrdiff_t>(0, after - track.frames.begin() - 1));
@@ -155,10 +165,7 @@ ClipCurves make_curves(const Clip& clip, const Done& done) {
   const std::vector<int> above = ancestors_of(clip.skeleton, root);
 
   ClipCurves out{.name = clip.name, .rate_hz = clip.rate_hz, .values = SampleMatrix(clip.frames, layout.curve_count())};
-  for (const int j : above) add_rotation_side_track(clip, j, out.side_tracks);
-  for (const auto& track : clip.translations) {
-    if (track.joint != root) out.side_tracks.push_back(translation_side_track(track));
-  }
+  out.side_tracks = side_tracks_of(clip);
 
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
   for (int first = 0; first < clip.frames; first += frames_at_a_time) {

@@ -67,6 +67,9 @@ struct ClipCurves {
 [[nodiscard]] Clip clip_of_frames(const ClipCurves& curves, const Eigen::Ref<const SampleMatrix>& rows, int first,
                                   const Skeleton& skeleton);
 
+// Those of a clip alone: joints above the root, then translations, as clip_curves has them.
+[[nodiscard]] std::vector<SideTrack> side_tracks_of(const Clip& clip);
+
 // Puts a side track onto a clip that holds the frames from `first` on of the clip that it was made for.
 void apply_side_track(const SideTrack& track, int first, Clip& clip);
 

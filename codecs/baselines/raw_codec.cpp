@@ -9,12 +9,10 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/codecs/baselines/detail/packers.h"
-#include "kinespace/codecs/baselines/detail/stream_parts.h"
-#include "kinespace/codecs/stream/clip_table.h"
+#include "kinespace/codecs/stream/clip_reader.h"
 #include "kinespace/codecs/stream/codec.h"
 #include "kinespace/codecs/stream/joint_channels.h"
-#include "kinespace/motion/curves.h"
-#include "kinespace/storage/varint.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 
 namespace kinespace {
 namespace {
@@ -83,70 +81,29 @@ void from_planes(std::span<const std::byte> bytes, std::span<double> values, con
   }
 }
 
-class RawReader final : public StreamReader {
+class RawReader final : public ClipReader {
  public:
-  RawReader(Packer packer, Bitstream stream)
-      : packer_(packer),
-        stream_(std::move(stream)),
-        table_(unpack_clip_table(stream_.section("clips"), most_frames_of(stream_.size()), stream_.source())),
-        layout_(plain_layout(table_.skeletons.front())) {
-    ByteReader in(stream_.section("channels"), stream_.source());
-    std::vector<std::size_t> sizes;
-    for (std::size_t c = 0; c < table_.clips.size(); ++c) sizes.push_back(get_count(in, 1, "bytes of a clip"));
-    for (const std::size_t size : sizes) packed_.push_back(in.take(size));
-    in.expect_end();
-    for (const ClipEntry& clip : table_.clips) summaries_.push_back({clip.name, clip.rate_hz, clip.frames});
-  }
-
-  [[nodiscard]] const Bitstream& stream() const override { return stream_; }
-  [[nodiscard]] std::span<const ClipSummary> clips() const override { return summaries_; }
-  [[nodiscard]] const Skeleton& skeleton(std::size_t clip) const override {
-    return table_.skeletons[static_cast<std::size_t>(table_.clips[clip].skeleton)];
-  }
-
-  [[nodiscard]] Clip decode(std::size_t clip, int first, int count, int /*level*/) const override {
-    require_frames(*this, clip, first, count);
-    const ClipEntry& entry = table_.clips[clip];
-    Clip out = make_clip(entry.name, skeleton(clip), entry.rate_hz, entry.frames);
-    out.require_translation_track(out.skeleton.travel_root());
-    for (const SideTrack& track : entry.side_tracks) apply_side_track(track, 0, out);
-    std::vector<double> values(static_cast<std::size_t>(layout_.channel_count()) *
-                               static_cast<std::size_t>(entry.frames));
-    from_planes(unpack_bytes(packer_, packed_[clip], planes * values.size(), stream_.source()), values,
-                stream_.source());
-    write_channels(layout_, values, 0, entry.frames, out);
-    return first == 0 && count == entry.frames ? out : slice(out, first, count);
-  }
-
-  [[nodiscard]] std::vector<Clip> decode_all(int level) const override {
-    std::vector<Clip> out(summaries_.size());
-    tbb::parallel_for(std::size_t{0}, out.size(),
-                      [&](std::size_t c) { out[c] = decode(c, 0, summaries_[c].frames, level); });
-    return out;
-  }
+  RawReader(Packer packer, Bitstream bits)
+      : ClipReader(std::move(bits)),
+        packer_(packer),
+        layout_(plain_layout(table().skeletons.front())),
+        packed_(unpack_parts(stream().section("channels"), clips().size(), "bytes of a clip", stream().source())) {}
 
  private:
+  [[nodiscard]] Clip part(std::size_t clip, int first, int count, int /*level*/) const override {
+    const int frames = entry(clip).frames;
+    Clip out = at_rest(clip, 0, frames);
+    std::vector<double> values(static_cast<std::size_t>(layout_.channel_count()) * static_cast<std::size_t>(frames));
+    from_planes(unpack_bytes(packer_, packed_[clip], planes * values.size(), stream().source()), values,
+                stream().source());
+    write_channels(layout_, values, 0, frames, out);
+    return cut(std::move(out), first, count);
+  }
+
   Packer packer_;
-  Bitstream stream_;
-  ClipTable table_;
   ChannelLayout layout_;
   std::vector<std::span<const std::byte>> packed_;  // by clip
-  std::vector<ClipSummary> summaries_;
 };
-
-ClipTable table_of(std::span<const Clip> clips) {
-  ClipTable out;
-  for (const Clip& clip : clips) {
-    ClipEntry entry{.name = clip.name,
-                    .skeleton = out.add_skeleton(clip.skeleton, clip.name),
-                    .rate_hz = clip.rate_hz,
-                    .frames = clip.frames};
-    fill_blocks(entry);
-    entry.side_tracks = clip_curves(clip).side_tracks;
-    out.clips.push_back(std::move(entry));
-  }
-  return out;
-}
 
 void require_met(const CodecTarget& target, const MeasuredError& error, std::size_t size) {
   const bool met = (!target.mean_error_cm || error.mean_joint_error_cm <= *target.mean_error_cm) &&
@@ -173,33 +130,28 @@ std::span<const CodecSetting> RawCodec::settings() const {
 
 Bytes RawCodec::encode(std::span<const Clip> clips, const CodecOptions& options) const {
   const int level = static_cast<int>(setting(options, "level"));
-  const ClipTable table = table_of(clips);
+  const ClipTable table = clip_table_of(clips);
   const ChannelLayout layout = plain_layout(clips.front().skeleton);
   std::vector<Bytes> packed(clips.size());
   tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
     options.progress.check_stop();
     const ChannelCurves curves = channel_curves(clips[c], layout);
-    require_encodable(curves, clips[c].name);
+    require_channels_below(largest_channel_value, curves, clips[c].name);
     packed[c] = pack_bytes(packer_, level, to_planes(curves));
   });
-  ByteWriter channels;
-  for (const Bytes& clip : packed) put_varint(channels, clip.size());
-  for (const Bytes& clip : packed) channels.put_bytes(clip);
+  const Bytes clip_bytes = pack_clip_table(table);
+  const Bytes channels = pack_parts(packed);
   const auto write = [&](const MeasuredError& error) {
     BitstreamWriter out(stream_kind(name()));
     out.set_error(error);
-    const Bytes clip_bytes = pack_clip_table(table);
-    const std::size_t size = clip_bytes.size() + channels.size();
     out.add_section("clips", clip_bytes);
-    out.add_section("channels", channels.bytes());
-    add_padding(table.frames(), size, out);
+    out.add_section("channels", channels);
+    add_padding(out, clip_bytes.size() + channels.size(), table.frames());
     return out.finish();
   };
-  const Bytes draft = write({});
-  const MeasuredError error = measure_error(clips, *open(Bitstream::parse(draft, "the stream")));
-  Bytes out = write(error);
-  require_met(options.target, error, out.size());
-  return out;
+  CodedAttempt made = write_measured(clips, write, [&](Bitstream stream) { return open(std::move(stream)); });
+  require_met(options.target, made.error, made.stream.size());
+  return std::move(made.stream);
 }
 
 std::unique_ptr<StreamReader> RawCodec::open(Bitstream stream) const {

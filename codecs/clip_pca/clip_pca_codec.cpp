@@ -11,13 +11,13 @@
 #include "kinespace/codecs/clip_pca/detail/clip_clusters.h"
 #include "kinespace/codecs/clip_pca/detail/clip_pca_stream.h"
 #include "kinespace/codecs/rma/contact_ik.h"
-#include "kinespace/codecs/rma/detail/target_search.h"
 #include "kinespace/codecs/rma/marker_clips.h"
 #include "kinespace/codecs/rma/marker_decoder.h"
 #include "kinespace/codecs/rma/marker_encoder.h"
-#include "kinespace/codecs/rma/marker_reader.h"
 #include "kinespace/codecs/stream/clip_error.h"
+#include "kinespace/codecs/stream/clip_reader.h"
 #include "kinespace/codecs/stream/codec.h"
+#include "kinespace/codecs/stream/target_search.h"
 
 namespace kinespace {
 namespace {
@@ -168,16 +168,24 @@ class ClipPcaEncoder {
   std::vector<std::vector<ContactTrack>> contacts_;
 };
 
-class ClipPcaReader final : public MarkerReader {
+class ClipPcaReader final : public ClipReader {
  public:
   explicit ClipPcaReader(Bitstream bits)
-      : MarkerReader(std::move(bits)),
-        motion_(unpack_clip_pca(stream().section("motion"), table(), dimensions() + (dimensions() - 3) / 2,
+      : ClipReader(std::move(bits)),
+        motion_(unpack_clip_pca(stream().section("motion"), table(), coordinates(table()),
                                 most_numbers(stream().size()), stream().source())),
         decoder_(table(), motion_) {}
 
  private:
-  [[nodiscard]] Clip whole(std::size_t clip) const override { return decoder_.decode(clip); }
+  // Of a frame: those of its markers, and three a rotating joint.
+  static int coordinates(const ClipTable& table) {
+    const int markers = marker_dimensions(table);
+    return markers + (markers - 3) / 2;
+  }
+  // Contacts reach over the whole clip.
+  [[nodiscard]] Clip part(std::size_t clip, int first, int count, int) const override {
+    return cut(decoder_.decode(clip), first, count);
+  }
 
   ClipPcaStream motion_;
   ClipPcaDecoder decoder_;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/motion/simd.h"
 #include "kinespace/storage/varint.h"
 

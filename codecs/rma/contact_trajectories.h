@@ -20,7 +20,7 @@
 
 #include <Eigen/Core>
 
-#include "kinespace/entropy/value_coder.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/motion/clip.h"
 
 namespace kinespace {

@@ -83,8 +83,7 @@ ClipTable marker_clip_table(std::span<const Clip> clips, const AlignedClips& ali
                     .blocks = {},
                     .finer = {},
                     .side_tracks = aligned.vectors[c].side_tracks};
-    for (int left = clip.frames; left > 0; left -= longest_block) entry.blocks.push_back(std::min(left, longest_block));
-    entry.finer.assign(entry.blocks.size(), 0);
+    entry.cut_evenly();
     out.clips.push_back(std::move(entry));
   }
   return out;

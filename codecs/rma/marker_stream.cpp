@@ -71,8 +71,8 @@ int AxisSteps::range_code(double range_cm) {
   return static_cast<int>(std::ceil(16 * std::log2(std::max(range_cm, least)) + 1e-9));
 }
 
-std::int64_t most_numbers(std::size_t bytes) {
-  return (std::int64_t{1} << 21) + 4 * static_cast<std::int64_t>(bytes);
+int marker_dimensions(const ClipTable& table) {
+  return 3 + 6 * static_cast<int>(table.skeletons.front().rotating_joints().size());
 }
 
 std::int64_t numbers_in(const MarkerStream& stream) {

@@ -83,8 +83,8 @@ struct MarkerStream {
   std::vector<std::vector<ContactCode>> contacts;  // by input clip
 };
 
-// How many numbers a stream of so many bytes may hold at most: what a reader allocates for.
-[[nodiscard]] std::int64_t most_numbers(std::size_t bytes);
+// Of a frame of markers of clips of that tree: three of the root, six a rotating joint.
+[[nodiscard]] int marker_dimensions(const ClipTable& table);
 [[nodiscard]] std::int64_t numbers_in(const MarkerStream& stream);
 
 [[nodiscard]] Bytes pack_marker_stream(const MarkerStream& stream);

@@ -6,9 +6,9 @@
 #include "kinespace/codecs/rma/detail/paper_profile.h"
 #include "kinespace/codecs/rma/detail/repeat_profile.h"
 #include "kinespace/codecs/rma/detail/repeat_stream.h"
-#include "kinespace/codecs/rma/marker_reader.h"
 #include "kinespace/codecs/rma/marker_stream.h"
 #include "kinespace/codecs/stream/codec.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 
 namespace kinespace {
 namespace {
@@ -51,7 +51,6 @@ std::vector<std::vector<int>> rma_seams(std::span<const std::byte> bytes, std::s
   const Bitstream stream = Bitstream::parse(bytes, std::move(source));
   stream.require_kind(stream_kind("rma"));
   const ClipTable table = unpack_clip_table(stream.section("clips"), most_frames(stream.size()), stream.source());
-  const int joints = static_cast<int>(table.skeletons.front().rotating_joints().size());
   const std::int64_t numbers = most_numbers(stream.size());
   std::vector<std::vector<int>> out(table.clips.size());
   const auto add = [&](std::size_t clip, int first) {
@@ -59,7 +58,7 @@ std::vector<std::vector<int>> rma_seams(std::span<const std::byte> bytes, std::s
   };
   if (stream.option("profile") == "paper") {
     const MarkerStream motion =
-        unpack_marker_stream(stream.section("motion"), table, 3 + 6 * joints, numbers, stream.source());
+        unpack_marker_stream(stream.section("motion"), table, marker_dimensions(table), numbers, stream.source());
     std::size_t piece = 0;
     for (std::size_t c = 0; c < out.size(); ++c) {
       for (int f = 0; f < table.clips[c].frames && piece < motion.clips.size(); f += motion.clips[piece++].frames) {
@@ -69,6 +68,7 @@ std::vector<std::vector<int>> rma_seams(std::span<const std::byte> bytes, std::s
     return out;
   }
   RepeatTables tables;
+  const int joints = static_cast<int>(table.skeletons.front().rotating_joints().size());
   tables.tables = unpack_pose_space_tables(stream.section("tables"), joints, stream.source());
   unpack_repeats(stream.section("repeats"), table, numbers, stream.source(), tables);
   std::size_t window = 0;

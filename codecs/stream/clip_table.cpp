@@ -5,8 +5,11 @@
 #include <cmath>
 #include <cstring>
 
+#include <tbb/parallel_for.h>
+
 #include "kinespace/base/error.h"
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
+#include "kinespace/motion/curves.h"
 
 namespace kinespace {
 namespace {
@@ -288,6 +291,27 @@ std::vector<Skeleton> get_skeletons(IntegerReader& in, std::int64_t most, std::i
 }
 
 }  // namespace
+
+void ClipEntry::cut_evenly() {
+  blocks.clear();
+  for (int left = frames; left > 0; left -= longest_block) blocks.push_back(std::min(left, longest_block));
+  finer.assign(blocks.size(), 0);
+}
+
+ClipTable clip_table_of(std::span<const Clip> clips) {
+  ClipTable out;
+  for (const Clip& clip : clips) {
+    ClipEntry entry{.name = clip.name,
+                    .skeleton = out.add_skeleton(clip.skeleton, clip.name),
+                    .rate_hz = clip.rate_hz,
+                    .frames = clip.frames};
+    entry.cut_evenly();
+    out.clips.push_back(std::move(entry));
+  }
+  tbb::parallel_for(std::size_t{0}, clips.size(),
+                    [&](std::size_t c) { out.clips[c].side_tracks = side_tracks_of(clips[c]); });
+  return out;
+}
 
 std::int64_t ClipTable::frames() const {
   std::int64_t sum = 0;

@@ -26,6 +26,9 @@ struct ClipEntry {
   std::vector<int> blocks;  // lengths in frames, each 1 to longest_block, together `frames`
   std::vector<int> finer;   // by block: its quantiser step is the stream's over 2^(finer / 2); 0 to finest_block
   std::vector<SideTrack> side_tracks;
+
+  // Blocks as long as may be, for codecs to which they mean nothing.
+  void cut_evenly();
 };
 
 struct ClipTable {
@@ -37,6 +40,9 @@ struct ClipTable {
   // is another than that of the first.
   int add_skeleton(const Skeleton& skeleton, const std::string& clip);
 };
+
+// Of clips whose codec keeps their placement among its curves, and cuts them itself. Throws as add_skeleton does.
+[[nodiscard]] ClipTable clip_table_of(std::span<const Clip> clips);
 
 // `known`: skeletons that the reader has and that need no telling.
 [[nodiscard]] Bytes pack_clip_table(const ClipTable& table, std::span<const Skeleton> known = {});

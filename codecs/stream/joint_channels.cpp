@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "kinespace/base/error.h"
 #include "kinespace/codecs/stream/detail/joint_turns.h"
 #include "kinespace/entropy/range_coder.h"
@@ -250,6 +252,17 @@ ChannelLayout unpack_layout(std::span<const std::byte> bytes, const Skeleton& sk
   }
   if (!in.used_up()) damaged(source);
   return out;
+}
+
+void require_channels_below(double most, const ChannelCurves& curves, const std::string& clip) {
+  for (const double v : curves.values) {
+    if (std::abs(v) < most) continue;
+    throw Error(ErrorKind::bad_input,
+                {.file = clip,
+                 .found = fmt::format("a root farther than {:.0f} km away, or a joint that turned {:.0f} times",
+                                      most / 1e5, std::floor(most / 360)),
+                 .expected = "positions in centimetres and rotations"});
+  }
 }
 
 }  // namespace kinespace

@@ -112,4 +112,9 @@ void write_channels(const ChannelLayout& layout, std::span<const double> channel
 [[nodiscard]] ChannelLayout unpack_layout(std::span<const std::byte> bytes, const Skeleton& skeleton,
                                           const std::string& source);
 
+// Channels beyond this, in cm or degrees, are damage to most readers.
+inline constexpr double largest_channel_value = 1e7;
+// Throws Error{bad_input} naming the clip when a channel is as large as `most`, or no number.
+void require_channels_below(double most, const ChannelCurves& curves, const std::string& clip);
+
 }  // namespace kinespace

@@ -7,7 +7,7 @@
 #include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/mesh/harmonics.h"
 #include "kinespace/mesh_codecs/basis_cache.h"
 #include "kinespace/mesh_codecs/detail/linear_prediction.h"

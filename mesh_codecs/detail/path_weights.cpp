@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <utility>
 
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/mesh/connectivity.h"
 
 namespace kinespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "kinespace/base/bytes.h"
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/mesh/mesh_sequence.h"
 
 namespace kinespace {

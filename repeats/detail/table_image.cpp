@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <png.h>
 #include <tbb/parallel_for.h>
 
-#include "kinespace/base/error.h"
+#include "kinespace/base/png.h"
 
 namespace kinespace {
 namespace {
@@ -55,18 +54,7 @@ void TableImage::mark(double i, double j, const Colour& colour, int width) {
 }
 
 std::string TableImage::png() const {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  image.width = static_cast<png_uint_32>(size_);
-  image.height = static_cast<png_uint_32>(size_);
-  image.format = PNG_FORMAT_RGB;
-  std::string out(PNG_IMAGE_PNG_SIZE_MAX(image), '\0');
-  png_alloc_size_t bytes = out.size();
-  if (png_image_write_to_memory(&image, out.data(), &bytes, 0, values_.data(), 0, nullptr) == 0) {
-    throw Error(ErrorKind::machine, {.found = std::string("libpng: ") + image.message, .expected = "an image"});
-  }
-  out.resize(bytes);
-  return out;
+  return format_png(size_, size_, values_);
 }
 
 }  // namespace kinespace

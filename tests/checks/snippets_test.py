@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Compiles the C++ that the README, docs/ and headers show, so that what is shown can be typed off.
 
-    snippets_test.py COMPILER [INCLUDE_FOLDER...]
+    snippets_test.py COMPILER INCLUDE_FOLDER...
 
 Of a document the ```cpp blocks, in order, as one function (their #include lines before it; a block with a main of its own by itself); of a header
 the example in its first comment: the lines that begin with "//   ". Only the syntax and the types are checked. First a wrong example is shown to fail.
@@ -39,7 +39,7 @@ def programs_of_document(text):
 def program_of_header(header, given):
     head = (ROOT / header).read_text(encoding="utf-8").partition("#pragma once")[0]
     lines = [line[5:] for line in head.split("\n") if line.startswith("//   ")]
-    return f'#include "{header}"\n{given}' + as_program(["\n".join(lines)]) if lines else None
+    return f'#include "kinespace/{header}"\n{given}' + as_program(["\n".join(lines)]) if lines else None
 
 
 def errors(source, compiler, includes):

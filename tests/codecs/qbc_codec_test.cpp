@@ -10,6 +10,7 @@
 #include "kinespace/codecs/qbc/detail/curve_choice.h"
 #include "kinespace/codecs/qbc/detail/qbc_stream.h"
 #include "kinespace/codecs/stream/joint_channels.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 #include "kinespace/motion/euler.h"
 #include "kinespace/motion/read.h"
 #include "tests/codecs/sample_stream.h"
@@ -85,7 +86,7 @@ TEST(Qbc, a_joint_decoded_alone_is_the_joint_of_the_whole) {
 Bytes spoilt_but_for(const Bytes& stream, std::size_t kept) {
   const Bitstream parsed = Bitstream::parse(stream, "s");
   const auto table_bytes = parsed.section("clips");
-  const ClipTable table = unpack_clip_table(table_bytes, most_qbc_frames(stream.size()), "s");
+  const ClipTable table = unpack_clip_table(table_bytes, most_frames(stream.size()), "s");
   const auto section = parsed.section("curves");
   const QbcCurves curves = unpack_curves(section, table, "s");
   Bytes changed(section.begin(), section.end());

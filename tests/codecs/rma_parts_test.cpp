@@ -9,7 +9,7 @@
 #include "kinespace/codecs/rma/detail/window_prediction.h"
 #include "kinespace/codecs/rma/seams.h"
 #include "kinespace/entropy/adaptive_bits.h"
-#include "kinespace/entropy/value_coder.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "tests/codecs/sample_stream.h"
 
 namespace kinespace {

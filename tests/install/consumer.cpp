@@ -1,13 +1,14 @@
-// A program of a user's: it sees only the installed headers and libraries.
+// A program of a user's: it sees only the installed headers and libraries, and has headers of its own that are named alike.
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 
-#include "kinespace/base/error.h"
-#include "kinespace/motion/clip.h"
-#include "kinespace/motion/error_measures.h"
-#include "kinespace/motion/read.h"
-#include "kinespace/motion/skeleton.h"
+#include <kinespace/kinespace.h>
+
+#include "base/error.h"
+#include "motion/clip.h"
+
+static_assert(KINESPACE_VERSION_MAJOR + KINESPACE_VERSION_MINOR + KINESPACE_VERSION_PATCH > 0);
 
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
@@ -26,5 +27,5 @@ int main(int argc, char** argv) {
   kinespace::write_clip(file, written);
   const kinespace::MotionError error = kinespace::compare(written, kinespace::read_clip(file));
   std::printf("%d joints, %d frames, %g cm\n", error.joints, error.frames, error.max_joint_error_cm);
-  return error.joints == 2 && error.frames == 4 && error.max_joint_error_cm < 1e-4 ? 0 : 1;
+  return error.joints == 2 && error.frames == 4 && error.max_joint_error_cm < 1e-4 ? user::Clip{}.code : 1;
 }

@@ -7,10 +7,9 @@
 
 #include "kinespace/codecs/baselines/channel_codec.h"
 #include "kinespace/codecs/baselines/detail/channel_metric.h"
-#include "kinespace/codecs/baselines/detail/stream_parts.h"
 #include "kinespace/codecs/stream/codec.h"
-#include "kinespace/motion/curves.h"
-#include "kinespace/storage/varint.h"
+#include "kinespace/codecs/stream/joint_channels.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 
 namespace kinespace {
 namespace {
@@ -67,19 +66,11 @@ struct ChannelEncoder::Coded {
 
 ChannelEncoder::ChannelEncoder(const ChannelTransform& transform, std::span<const Clip> clips,
                                const ChannelSearch& search, const Progress& progress)
-    : transform_(transform), clips_(clips), progress_(progress) {
+    : transform_(transform), clips_(clips), progress_(progress), table_(clip_table_of(clips)) {
   prepare(search);
 }
 
 void ChannelEncoder::prepare(const ChannelSearch& search) {
-  for (const Clip& clip : clips_) {
-    ClipEntry entry{.name = clip.name,
-                    .skeleton = table_.add_skeleton(clip.skeleton, clip.name),
-                    .rate_hz = clip.rate_hz,
-                    .frames = clip.frames};
-    fill_blocks(entry);
-    table_.clips.push_back(std::move(entry));
-  }
   tables_.layout = find_channel_layout(clips_, search);
   places_ = lay_out_pieces(table_);
   std::vector<std::size_t> first_piece;
@@ -92,9 +83,8 @@ void ChannelEncoder::prepare(const ChannelSearch& search) {
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
     progress_.check_stop();
     const Clip& clip = clips_[c];
-    table_.clips[c].side_tracks = clip_curves(clip).side_tracks;
     const ChannelCurves curves = channel_curves(clip, tables_.layout);
-    require_encodable(curves, clip.name);
+    require_channels_below(largest_channel_value, curves, clip.name);
     const Eigen::MatrixXd metric = channel_metric(clip, tables_.layout, curves);
     for (std::size_t p = first_piece[c]; p < first_piece[c + 1]; ++p) {
       ChannelPiece& piece = pieces_[p];
@@ -157,7 +147,7 @@ void ChannelEncoder::code(Coded& coded, double rate_weight) const {
   for (const CodingStatistics& one : statistics) coded.statistics.add(one);
 }
 
-ChannelEncoder::Result ChannelEncoder::encode(const Quality& quality, double rate_weight) {
+CodedAttempt ChannelEncoder::encode(const Quality& quality, double rate_weight) {
   Coded coded{.tables = tables_, .coefficients = {}, .pieces = {}, .statistics = {}};
   coded.coefficients.resize(pieces_.size());
   tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
@@ -189,10 +179,9 @@ ChannelEncoder::Result ChannelEncoder::encode(const Quality& quality, double rat
     coding.start = learned;
     code(coded, rate_weight);
   }
-  const Bytes draft = write(coded, {});
-  const MeasuredError error =
-      measure_error(clips_, *open_channel_stream(transform_, Bitstream::parse(draft, "the stream")));
-  return {write(coded, error), error};
+  return write_measured(
+      clips_, [&](const MeasuredError& error) { return write(coded, error); },
+      [&](Bitstream stream) { return open_channel_stream(transform_, std::move(stream)); });
 }
 
 Bytes ChannelEncoder::write(const Coded& coded, const MeasuredError& error) const {
@@ -201,17 +190,13 @@ Bytes ChannelEncoder::write(const Coded& coded, const MeasuredError& error) cons
   Bytes clips = pack_clip_table(table_);
   Bytes tables = pack_channel_tables(coded.tables);
   std::vector<Bytes> codes;
-  ByteWriter pieces;
-  for (const PieceCode& piece : coded.pieces) {
-    codes.push_back(pack_piece(piece));
-    put_varint(pieces, codes.back().size());
-  }
-  for (const Bytes& piece : codes) pieces.put_bytes(piece);
+  for (const PieceCode& piece : coded.pieces) codes.push_back(pack_piece(piece));
+  Bytes pieces = pack_parts(codes);
   const std::size_t size = clips.size() + tables.size() + pieces.size();
   out.add_section("clips", std::move(clips));
   out.add_section("tables", std::move(tables));
-  out.add_section("pieces", std::move(pieces).take());
-  add_padding(table_.frames(), size, out);
+  out.add_section("pieces", std::move(pieces));
+  add_padding(out, size, table_.frames());
   return out.finish();
 }
 

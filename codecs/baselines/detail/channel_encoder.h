@@ -9,7 +9,7 @@
 #include "kinespace/base/progress.h"
 #include "kinespace/codecs/baselines/detail/channel_stream.h"
 #include "kinespace/codecs/baselines/detail/channel_transform.h"
-#include "kinespace/storage/bitstream.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 
 namespace kinespace {
 
@@ -20,11 +20,7 @@ class ChannelEncoder {
   ChannelEncoder(const ChannelTransform& transform, std::span<const Clip> clips, const ChannelSearch& search,
                  const Progress& progress);
 
-  struct Result {
-    Bytes stream;
-    MeasuredError error;  // of what a reader decodes from it, as its header has it
-  };
-  [[nodiscard]] Result encode(const Quality& quality, double rate_weight);
+  [[nodiscard]] CodedAttempt encode(const Quality& quality, double rate_weight);
 
  private:
   struct Coded;

@@ -1,84 +1,60 @@
 // Decoding of streams of channel_codec.h.
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
 #include "kinespace/base/error.h"
 #include "kinespace/codecs/baselines/channel_codec.h"
 #include "kinespace/codecs/baselines/detail/channel_stream.h"
-#include "kinespace/codecs/baselines/detail/stream_parts.h"
+#include "kinespace/codecs/stream/clip_reader.h"
 #include "kinespace/codecs/stream/codec.h"
-#include "kinespace/storage/varint.h"
+#include "kinespace/codecs/stream/joint_channels.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 
 namespace kinespace {
 namespace {
 
-class ChannelReader final : public StreamReader {
+class ChannelReader final : public ClipReader {
  public:
-  ChannelReader(const ChannelTransform& transform, Bitstream stream)
-      : transform_(transform),
-        stream_(std::move(stream)),
-        table_(unpack_clip_table(stream_.section("clips"), most_frames_of(stream_.size()), stream_.source())),
-        tables_(unpack_channel_tables(stream_.section("tables"), table_.skeletons.front(), transform.weighted(),
-                                      stream_.source())),
-        places_(lay_out_pieces(table_)) {
-    ByteReader in(stream_.section("pieces"), stream_.source());
-    std::vector<std::size_t> sizes;
-    for (std::size_t p = 0; p < places_.size(); ++p) sizes.push_back(get_count(in, 1, "bytes of a piece"));
-    for (const std::size_t size : sizes) pieces_.push_back(in.take(size));
-    in.expect_end();
+  ChannelReader(const ChannelTransform& transform, Bitstream bits)
+      : ClipReader(std::move(bits)),
+        transform_(transform),
+        tables_(unpack_channel_tables(stream().section("tables"), table().skeletons.front(), transform.weighted(),
+                                      stream().source())),
+        places_(lay_out_pieces(table())),
+        pieces_(unpack_parts(stream().section("pieces"), places_.size(), "bytes of a piece", stream().source())) {
     for (std::size_t p = 0; p < places_.size(); ++p) {
       if (places_[p].first == 0) first_piece_.push_back(p);
     }
     first_piece_.push_back(places_.size());
-    for (const ClipEntry& clip : table_.clips) summaries_.push_back({clip.name, clip.rate_hz, clip.frames});
   }
 
-  [[nodiscard]] const Bitstream& stream() const override { return stream_; }
-  [[nodiscard]] std::span<const ClipSummary> clips() const override { return summaries_; }
-  [[nodiscard]] const Skeleton& skeleton(std::size_t clip) const override {
-    return table_.skeletons[static_cast<std::size_t>(table_.clips[clip].skeleton)];
-  }
-
-  [[nodiscard]] Clip decode(std::size_t clip, int first, int count, int /*level*/) const override {
-    require_frames(*this, clip, first, count);
+ private:
+  [[nodiscard]] Clip part(std::size_t clip, int first, int count, int /*level*/) const override {
     std::size_t begin = first_piece_[clip];
     while (places_[begin].first + places_[begin].frames <= first) ++begin;
     std::size_t end = begin;
     while (end < first_piece_[clip + 1] && places_[end].first < first + count) ++end;
     const int decoded_first = places_[begin].first;
     const int decoded = places_[end - 1].first + places_[end - 1].frames - decoded_first;
-    Clip out = make_clip(summaries_[clip].name, skeleton(clip), summaries_[clip].rate_hz, decoded);
-    out.require_translation_track(out.skeleton.travel_root());
-    for (const SideTrack& track : table_.clips[clip].side_tracks) apply_side_track(track, decoded_first, out);
+    Clip out = at_rest(clip, decoded_first, decoded);
     for (std::size_t p = begin; p < end; ++p) write_piece(p, decoded_first, out);
-    if (decoded_first == first && decoded == count) return out;
-    return slice(out, first - decoded_first, count);
+    return cut(std::move(out), first - decoded_first, count);
   }
 
-  [[nodiscard]] std::vector<Clip> decode_all(int level) const override {
-    std::vector<Clip> out(summaries_.size());
-    tbb::parallel_for(std::size_t{0}, out.size(),
-                      [&](std::size_t c) { out[c] = decode(c, 0, summaries_[c].frames, level); });
-    return out;
-  }
-
- private:
   void write_piece(std::size_t p, int decoded_first, Clip& out) const {
     const PiecePlace& place = places_[p];
-    const PieceView code = view_piece(pieces_[p], stream_.source());
+    const PieceView code = view_piece(pieces_[p], stream().source());
     const int channels = tables_.layout.channel_count();
-    const PieceShape whole = transform_.shape(channels, place.frames, out.rate_hz, code.side, stream_.source());
+    const PieceShape whole = transform_.shape(channels, place.frames, out.rate_hz, code.side, stream().source());
     const int components = tables_.coding.spectrum.components;
     if (whole.components > components) damaged("more components in a piece than in the tables");
     const PieceShape shape = coded_shape(whole, tables_.coding.spectrum);
     std::vector<double> coefficients(static_cast<std::size_t>(components) * static_cast<std::size_t>(shape.functions),
                                      0.0);
     CoefficientBlock block{.functions = shape.functions, .edges = shape.edges, .values = coefficients};
-    decode_group(std::span(&block, 1), tables_.coding, code.layers, stream_.source());
+    decode_group(std::span(&block, 1), tables_.coding, code.layers, stream().source());
     for (double& c : coefficients) c *= code.step;
     std::vector<double> values(static_cast<std::size_t>(channels) * static_cast<std::size_t>(place.frames), 0.0);
-    transform_.synthesise(shape, code.side, coefficients, place.frames, code.step, values, stream_.source());
+    transform_.synthesise(shape, code.side, coefficients, place.frames, code.step, values, stream().source());
     for (int c = 0; c < channels; ++c) {
       const double scale = 1 / tables_.weight(c);
       const auto n = static_cast<std::size_t>(place.frames);
@@ -91,18 +67,16 @@ class ChannelReader final : public StreamReader {
   }
 
   [[noreturn]] void damaged(std::string found) const {
-    throw Error(ErrorKind::bad_input,
-                {.file = stream_.source(), .found = std::move(found), .expected = "what the encoder writes (damaged)"});
+    throw Error(
+        ErrorKind::bad_input,
+        {.file = stream().source(), .found = std::move(found), .expected = "what the encoder writes (damaged)"});
   }
 
   const ChannelTransform& transform_;
-  Bitstream stream_;
-  ClipTable table_;
   ChannelTables tables_;
   std::vector<PiecePlace> places_;
   std::vector<std::span<const std::byte>> pieces_;
   std::vector<std::size_t> first_piece_;  // by clip, and the end
-  std::vector<ClipSummary> summaries_;
 };
 
 }  // namespace

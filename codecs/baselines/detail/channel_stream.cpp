@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/storage/varint.h"
 
 namespace kinespace {

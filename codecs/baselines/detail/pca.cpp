@@ -11,7 +11,7 @@
 
 #include "kinespace/codecs/baselines/detail/channel_transform.h"
 #include "kinespace/codecs/pose_space/joint_basis.h"
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/storage/varint.h"
 
 namespace kinespace {

@@ -6,6 +6,7 @@
 
 #include "kinespace/codecs/pose_space/detail/pose_space_encoder.h"
 #include "kinespace/codecs/stream/codec.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 #include "kinespace/storage/bitstream.h"
 #include "kinespace/storage/varint.h"
 
@@ -215,19 +216,14 @@ Bytes write_stream(const Attempt& attempt, const MeasuredError& error, const Pos
   std::vector<Bytes> layers;
   std::size_t size = clips.size() + tables.size();
   for (std::size_t layer = 0; layer < layer_count; ++layer) {
-    ByteWriter block;
-    for (const auto& group : attempt.groups) put_varint(block, group[layer].size());
-    for (const auto& group : attempt.groups) block.put_bytes(group[layer]);
-    layers.push_back(std::move(block).take());
+    std::vector<Bytes> groups;
+    for (const auto& group : attempt.groups) groups.push_back(group[layer]);
+    layers.push_back(pack_parts(groups));
     size += layers.back().size();
   }
   out.add_section("clips", clips);
   out.add_section("tables", tables);
-  // A reader believes so many frames of so many bytes; motion that never moves has to make up for it.
-  const std::int64_t needed = (attempt.clips.frames() - 65536 + 255) / 256;
-  if (needed > static_cast<std::int64_t>(size)) {
-    out.add_section("padding", Bytes(static_cast<std::size_t>(needed) - size, std::byte{0}));
-  }
+  add_padding(out, size, attempt.clips.frames());
   out.add_progressive_section("layers", layers);
   return out.finish();
 }

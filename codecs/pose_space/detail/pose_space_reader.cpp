@@ -11,88 +11,45 @@
 #include "kinespace/codecs/pose_space/detail/pose_space_encoder.h"
 #include "kinespace/codecs/pose_space/pose_space_codec.h"
 #include "kinespace/codecs/pose_space/pose_space_tables.h"
+#include "kinespace/codecs/stream/clip_reader.h"
 #include "kinespace/codecs/stream/codec.h"
-#include "kinespace/storage/varint.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 
 namespace kinespace {
 namespace {
 
-// One layer of the stream: a code for each group.
-std::vector<std::span<const std::byte>> split_layer(std::span<const std::byte> layer, std::size_t groups,
-                                                    const std::string& source) {
-  ByteReader in(layer, source);
-  std::vector<std::size_t> sizes;
-  for (std::size_t g = 0; g < groups; ++g) sizes.push_back(get_count(in, 1, "bytes of a group"));
-  std::vector<std::span<const std::byte>> out;
-  for (const std::size_t size : sizes) out.push_back(in.take(size));
-  in.expect_end();
-  return out;
-}
-
-class PoseSpaceReader final : public StreamReader {
+class PoseSpaceReader final : public ClipReader {
  public:
-  PoseSpaceReader(Bitstream stream, const PoseSpaceBasis* basis)
-      : stream_(std::move(stream)),
-        table_(unpack_clip_table(stream_.section("clips"), most_frames(), stream_.source(), known_skeletons(basis))),
+  PoseSpaceReader(Bitstream bits, const PoseSpaceBasis* basis)
+      : ClipReader(std::move(bits), known_skeletons(basis), Length::may_be_cut_short),
         tables_(read_tables(basis)),
-        layout_(lay_out(table_, tables_.coding.spectrum, tables_.group_frames)),
-        synthesis_(tables_, table_.skeletons.front()) {
-    const auto blocks = stream_.blocks("layers");
+        layout_(lay_out(table(), tables_.coding.spectrum, tables_.group_frames)),
+        synthesis_(tables_, table().skeletons.front()) {
+    const auto blocks = stream().blocks("layers");
     if (blocks.size() > layer_count) {
-      throw Error(ErrorKind::bad_input, {.file = stream_.source(),
+      throw Error(ErrorKind::bad_input, {.file = stream().source(),
                                          .found = fmt::format("{} layers", blocks.size()),
                                          .expected = fmt::format("at most {}", layer_count)});
     }
     layers_.resize(layout_.groups.size());
     for (const auto block : blocks) {
-      const auto parts = split_layer(block, layout_.groups.size(), stream_.source());
+      const auto parts = unpack_parts(block, layout_.groups.size(), "bytes of a group", stream().source());
       for (std::size_t g = 0; g < parts.size(); ++g) layers_[g].push_back(parts[g]);
     }
     levels_ = static_cast<int>(blocks.size());
-    for (const ClipEntry& clip : table_.clips) summaries_.push_back({clip.name, clip.rate_hz, clip.frames});
   }
 
-  [[nodiscard]] const Bitstream& stream() const override { return stream_; }
-  [[nodiscard]] std::span<const ClipSummary> clips() const override { return summaries_; }
-  [[nodiscard]] const Skeleton& skeleton(std::size_t clip) const override {
-    return table_.skeletons[static_cast<std::size_t>(table_.clips[clip].skeleton)];
-  }
   [[nodiscard]] int levels() const override { return levels_; }
 
-  [[nodiscard]] Clip decode(std::size_t clip, int first, int count, int level) const override {
-    check_range(clip, first, count);
-    const ClipEntry& entry = table_.clips[clip];
-    // From the first window that is needed to the last.
-    std::size_t begin = layout_.first_of_clip[clip];
-    while (layout_.windows[begin].first + layout_.windows[begin].points <= first) ++begin;
-    std::size_t end = begin;
-    while (end < layout_.first_of_clip[clip + 1] && layout_.windows[end].first < first + count) ++end;
-    const int decoded_first = layout_.windows[begin].first;
-    const WindowPlace& last = layout_.windows[end - 1];
-    Clip out = empty_clip(entry, decoded_first, last.first + last.points - decoded_first);
-    for (std::size_t g = 0; g < layout_.groups.size(); ++g) {
-      const WindowGroup& group = layout_.groups[g];
-      const std::size_t from = std::max(begin, group.first);
-      const std::size_t to = std::min(end, group.first + group.count);
-      if (from >= to) continue;
-      const GroupValues values = decode_values(g, level);
-      PoseWriter writer(tables_.reference, entry.placement, out);
-      for (std::size_t w = from; w < to; ++w) write_window(values, w - group.first, w, decoded_first, writer);
-    }
-    if (decoded_first == first && out.frames == count) return out;
-    return slice(out, first - decoded_first, count);
-  }
-
   [[nodiscard]] std::vector<Clip> decode_all(int level) const override {
-    std::vector<Clip> out(table_.clips.size());
-    tbb::parallel_for(std::size_t{0}, out.size(),
-                      [&](std::size_t c) { out[c] = empty_clip(table_.clips[c], 0, table_.clips[c].frames); });
+    std::vector<Clip> out(clips().size());
+    tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t c) { out[c] = at_rest(c, 0, entry(c).frames); });
     tbb::parallel_for(std::size_t{0}, layout_.groups.size(), [&](std::size_t g) {
       const WindowGroup& group = layout_.groups[g];
       const GroupValues values = decode_values(g, level);
       for (std::size_t i = 0; i < group.count; ++i) {
         const auto clip = static_cast<std::size_t>(layout_.windows[group.first + i].clip);
-        PoseWriter writer(tables_.reference, table_.clips[clip].placement, out[clip]);
+        PoseWriter writer(tables_.reference, entry(clip).placement, out[clip]);
         write_window(values, i, group.first + i, 0, writer);
       }
     });
@@ -124,6 +81,27 @@ class PoseSpaceReader final : public StreamReader {
   }
 
  private:
+  [[nodiscard]] Clip part(std::size_t clip, int first, int count, int level) const override {
+    // From the first window that is needed to the last.
+    std::size_t begin = layout_.first_of_clip[clip];
+    while (layout_.windows[begin].first + layout_.windows[begin].points <= first) ++begin;
+    std::size_t end = begin;
+    while (end < layout_.first_of_clip[clip + 1] && layout_.windows[end].first < first + count) ++end;
+    const int decoded_first = layout_.windows[begin].first;
+    const WindowPlace& last = layout_.windows[end - 1];
+    Clip out = at_rest(clip, decoded_first, last.first + last.points - decoded_first);
+    for (std::size_t g = 0; g < layout_.groups.size(); ++g) {
+      const WindowGroup& group = layout_.groups[g];
+      const std::size_t from = std::max(begin, group.first);
+      const std::size_t to = std::min(end, group.first + group.count);
+      if (from >= to) continue;
+      const GroupValues values = decode_values(g, level);
+      PoseWriter writer(tables_.reference, entry(clip).placement, out);
+      for (std::size_t w = from; w < to; ++w) write_window(values, w - group.first, w, decoded_first, writer);
+    }
+    return cut(std::move(out), first - decoded_first, count);
+  }
+
   // Of windows of one clip that follow one another.
   struct RunErrors {
     std::size_t clip = 0;
@@ -140,8 +118,8 @@ class PoseSpaceReader final : public StreamReader {
       while (w < group.first + group.count && layout_.windows[w].clip == layout_.windows[begin].clip) ++w;
       const int first = layout_.windows[begin].first;
       const int count = layout_.windows[w - 1].first + layout_.windows[w - 1].points - first;
-      Clip decoded = empty_clip(table_.clips[clip], first, count);
-      PoseWriter writer(tables_.reference, table_.clips[clip].placement, decoded);
+      Clip decoded = at_rest(clip, first, count);
+      PoseWriter writer(tables_.reference, entry(clip).placement, decoded);
       for (std::size_t i = begin; i < w; ++i) write_window(values, i - group.first, i, first, writer);
       append_joint_errors(originals[clip], decoded, first, count, 0, out.emplace_back(RunErrors{clip, {}}).joints);
     }
@@ -159,38 +137,17 @@ class PoseSpaceReader final : public StreamReader {
   }
 
   [[nodiscard]] PoseSpaceTables read_tables(const PoseSpaceBasis* basis) const {
-    const auto bytes = stream_.section("tables");
-    const Skeleton& skeleton = table_.skeletons.front();
+    const auto bytes = stream().section("tables");
+    const Skeleton& skeleton = table().skeletons.front();
     if (basis == nullptr) {
-      return unpack_pose_space_tables(bytes, static_cast<int>(skeleton.rotating_joints().size()), stream_.source());
+      return unpack_pose_space_tables(bytes, static_cast<int>(skeleton.rotating_joints().size()), stream().source());
     }
     if (!skeleton.same_tree(basis->skeletons().front())) {
-      throw Error(ErrorKind::bad_input, {.file = stream_.source(),
+      throw Error(ErrorKind::bad_input, {.file = stream().source(),
                                          .found = "a skeleton of another tree than its basis",
                                          .expected = "the skeleton of the basis (damaged)"});
     }
-    return unpack_own_tables(bytes, basis->rungs(), stream_.source());
-  }
-
-  // No more frames are believed than would fit this (an encoder pads what is smaller).
-  [[nodiscard]] std::int64_t most_frames() const { return 65536 + 256 * static_cast<std::int64_t>(stream_.size()); }
-
-  void check_range(std::size_t clip, int first, int count) const {
-    const bool there =
-        clip < table_.clips.size() && first >= 0 && count >= 1 && first <= table_.clips[clip].frames - count;
-    if (there) return;
-    throw Error(ErrorKind::usage, {.file = stream_.source(),
-                                   .found = fmt::format("frames {} to {} of clip {}", first, first + count, clip),
-                                   .expected = "frames that the stream has"});
-  }
-
-  // With side tracks applied; of a part of a clip, of that part.
-  [[nodiscard]] Clip empty_clip(const ClipEntry& entry, int first, int count) const {
-    const Skeleton& bones = table_.skeletons[static_cast<std::size_t>(entry.skeleton)];
-    Clip out = make_clip(entry.name, bones, entry.rate_hz, count);
-    out.require_translation_track(bones.travel_root());
-    for (const SideTrack& track : entry.side_tracks) apply_side_track(track, first, out);
-    return out;
+    return unpack_own_tables(bytes, basis->rungs(), stream().source());
   }
 
   [[nodiscard]] GroupValues decode_values(std::size_t g, int level) const {
@@ -214,7 +171,7 @@ class PoseSpaceReader final : public StreamReader {
     }
     const std::size_t wanted =
         level < 0 ? layers_[g].size() : std::min(layers_[g].size(), static_cast<std::size_t>(level));
-    decode_group(blocks, tables_.coding, std::span(layers_[g]).first(wanted), stream_.source());
+    decode_group(blocks, tables_.coding, std::span(layers_[g]).first(wanted), stream().source());
     return out;
   }
 
@@ -231,13 +188,10 @@ class PoseSpaceReader final : public StreamReader {
     writer.write(vectors, window.first - decoded_first, window.points);
   }
 
-  Bitstream stream_;
-  ClipTable table_;
   PoseSpaceTables tables_;
   WindowLayout layout_;
   WindowSynthesis synthesis_;
   std::vector<std::vector<std::span<const std::byte>>> layers_;  // [group][layer]
-  std::vector<ClipSummary> summaries_;
   int levels_ = 0;
 };
 

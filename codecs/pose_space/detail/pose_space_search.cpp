@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "kinespace/base/error.h"
-#include "kinespace/codecs/stream/codec.h"
+#include "kinespace/codecs/stream/target_search.h"
 
 namespace kinespace {
 namespace {
@@ -79,31 +79,11 @@ Bytes PoseSpaceSearch::for_max_error(double target) {
 }
 
 Bytes PoseSpaceSearch::for_bytes(std::int64_t target) {
-  double step = 2.5;
-  settle(step);
-  Bytes best;
-  double fits = 0;      // the finest step known to fit
-  double too_fine = 0;  // the coarsest known not to
-  constexpr int most_rounds = 16;
-  for (int round = 0; round < most_rounds; ++round) {
-    Bytes out = encoder_.finish(encoder_.attempt(step, settings_, &*last_));
-    const auto size = static_cast<std::int64_t>(out.size());
-    if (size <= target) {
-      if (out.size() > best.size()) best = std::move(out);
-      fits = fits == 0 ? step : std::min(fits, step);
-      if (static_cast<double>(size) > 0.985 * static_cast<double>(target) || step < 1e-4) break;
-    } else {
-      too_fine = std::max(too_fine, step);
-      if (step > 1e5) break;
-    }
-    const double ratio = static_cast<double>(size) / (0.995 * static_cast<double>(target));
-    step *= std::clamp(std::pow(ratio, 1.5), 0.1, 10.0);
-    const bool inside = fits == 0 || too_fine == 0 || (step > too_fine && step < fits);
-    if (!inside) step = std::sqrt(fits * too_fine);
-    if (fits > 0 && too_fine > 0 && fits < 1.003 * too_fine) break;
-  }
-  if (best.empty()) cannot_meet(fmt::format("{} bytes", target), "more; tables and names alone take that");
-  return best;
+  constexpr SearchRange range{.start = 2.5, .least = 1e-4, .most = 1e5, .rounds = 8};
+  settle(range.start);
+  return search_target({.bytes = target}, range, [&](double step) {
+    return CodedAttempt{.stream = encoder_.finish(encoder_.attempt(step, settings_, &*last_)), .error = {}};
+  });
 }
 
 // Plans for this step and finds the shell weight that just holds the ratio, on the sample.

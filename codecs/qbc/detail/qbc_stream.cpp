@@ -3,7 +3,7 @@
 #include <bit>
 #include <cmath>
 
-#include "kinespace/entropy/integer_model.h"
+#include "kinespace/entropy/integer_coder.h"
 #include "kinespace/storage/varint.h"
 
 namespace kinespace {
@@ -90,10 +90,6 @@ QbcCurves unpack_curves(std::span<const std::byte> bytes, const ClipTable& clips
   for (std::size_t i = 0; i < sizes.size(); ++i) out.curves[i].code = in.take(sizes[i]);
   in.expect_end();
   return out;
-}
-
-std::int64_t most_qbc_frames(std::uint64_t stream_size) {
-  return 65536 + 256 * static_cast<std::int64_t>(std::min<std::uint64_t>(stream_size, std::uint64_t{1} << 40));
 }
 
 }  // namespace kinespace

@@ -60,7 +60,4 @@ struct QbcCurves {
 [[nodiscard]] QbcCurves unpack_curves(std::span<const std::byte> bytes, const ClipTable& clips,
                                       const std::string& source);
 
-// No more frames are believed than would fit a stream of that size (an encoder pads what is smaller).
-[[nodiscard]] std::int64_t most_qbc_frames(std::uint64_t stream_size);
-
 }  // namespace kinespace

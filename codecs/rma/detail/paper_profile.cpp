@@ -3,11 +3,11 @@
 #include <algorithm>
 
 #include "kinespace/base/error.h"
-#include "kinespace/codecs/rma/detail/target_search.h"
 #include "kinespace/codecs/rma/marker_decoder.h"
 #include "kinespace/codecs/rma/marker_encoder.h"
-#include "kinespace/codecs/rma/marker_reader.h"
+#include "kinespace/codecs/stream/clip_reader.h"
 #include "kinespace/codecs/stream/codec.h"
+#include "kinespace/codecs/stream/target_search.h"
 
 namespace kinespace {
 namespace {
@@ -23,16 +23,19 @@ MarkerSettings settings_at(const MarkerEncoder& encoder, double coarseness, cons
           .contacts = given.contacts};
 }
 
-class PaperReader final : public MarkerReader {
+class PaperReader final : public ClipReader {
  public:
   explicit PaperReader(Bitstream stream)
-      : MarkerReader(std::move(stream)),
-        motion_(unpack_marker_stream(this->stream().section("motion"), table(), dimensions(),
+      : ClipReader(std::move(stream)),
+        motion_(unpack_marker_stream(this->stream().section("motion"), table(), marker_dimensions(table()),
                                      most_numbers(this->stream().size()), this->stream().source())),
         decoder_(table(), motion_, this->stream().source()) {}
 
  private:
-  [[nodiscard]] Clip whole(std::size_t clip) const override { return decoder_.decode(clip); }
+  // Contacts and seams reach over the whole clip.
+  [[nodiscard]] Clip part(std::size_t clip, int first, int count, int) const override {
+    return cut(decoder_.decode(clip), first, count);
+  }
 
   MarkerStream motion_;
   MarkerDecoder decoder_;

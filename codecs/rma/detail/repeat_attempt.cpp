@@ -6,8 +6,8 @@
 
 #include "kinespace/codecs/rma/contact_ik.h"
 #include "kinespace/codecs/rma/detail/repeat_encoder.h"
-#include "kinespace/codecs/rma/marker_reader.h"
 #include "kinespace/codecs/stream/codec.h"
+#include "kinespace/codecs/stream/measured_stream.h"
 #include "kinespace/storage/varint.h"
 
 namespace kinespace {
@@ -200,14 +200,12 @@ Bytes write_repeat_stream(const RepeatAttempt& attempt, const MeasuredError& err
   const Bytes clips = pack_clip_table(attempt.clips);
   const Bytes tables = pack_pose_space_tables(attempt.tables.tables);
   const Bytes repeats = pack_repeats(attempt.tables, attempt.clips);
-  ByteWriter windows;
-  for (const Bytes& group : attempt.groups) put_varint(windows, group.size());
-  for (const Bytes& group : attempt.groups) windows.put_bytes(group);
+  Bytes windows = pack_parts(attempt.groups);
   const std::size_t size = clips.size() + tables.size() + repeats.size() + windows.size();
   out.add_section("clips", clips);
   out.add_section("tables", tables);
   out.add_section("repeats", repeats);
-  out.add_section("windows", std::move(windows).take());
+  out.add_section("windows", std::move(windows));
   add_padding(out, size, attempt.clips.frames(), numbers_in(attempt.tables));
   return out.finish();
 }

@@ -11,7 +11,6 @@
 #include "kinespace/codecs/rma/contact_ik.h"
 #include "kinespace/codecs/rma/detail/spline_fit.h"
 #include "kinespace/codecs/rma/marker_clips.h"
-#include "kinespace/codecs/rma/marker_reader.h"
 #include "kinespace/codecs/stream/codec.h"
 #include "kinespace/storage/varint.h"
 

@@ -6,9 +6,9 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/codecs/rma/detail/repeat_encoder.h"
-#include "kinespace/codecs/rma/detail/target_search.h"
-#include "kinespace/codecs/rma/marker_reader.h"
 #include "kinespace/codecs/rma/marker_stream.h"
+#include "kinespace/codecs/stream/clip_reader.h"
+#include "kinespace/codecs/stream/target_search.h"
 #include "kinespace/storage/varint.h"
 
 namespace kinespace {
@@ -49,26 +49,24 @@ class GroupCache {
   std::size_t size_ = 0;
 };
 
-class RepeatReader final : public MarkerReader {
+class RepeatReader final : public ClipReader {
  public:
-  explicit RepeatReader(Bitstream bits) : MarkerReader(std::move(bits)) {
+  explicit RepeatReader(Bitstream bits) : ClipReader(std::move(bits)) {
     const std::string& source = stream().source();
     const int joints = static_cast<int>(table().skeletons.front().rotating_joints().size());
     tables_.tables = unpack_pose_space_tables(stream().section("tables"), joints, source);
     unpack_repeats(stream().section("repeats"), table(), most_numbers(stream().size()), source, tables_);
     layout_ = std::make_unique<RepeatLayout>(table(), tables_);
-    ByteReader in(stream().section("windows"), source);
-    std::vector<std::size_t> sizes;
-    for (std::size_t g = 0; g < layout_->plain.groups.size(); ++g)
-      sizes.push_back(get_count(in, 1, "bytes of a group"));
-    for (const std::size_t size : sizes) codes_.push_back(in.take(size));
-    in.expect_end();
+    codes_ = unpack_parts(stream().section("windows"), layout_->plain.groups.size(), "bytes of a group", source);
     decoder_ = std::make_unique<RepeatDecoder>(
         table(), tables_, *layout_, [this](std::size_t g) { return group(g); }, source);
   }
 
  private:
-  [[nodiscard]] Clip whole(std::size_t clip) const override { return decoder_->decode(clip); }
+  // Contacts and seams reach over the whole clip.
+  [[nodiscard]] Clip part(std::size_t clip, int first, int count, int) const override {
+    return cut(decoder_->decode(clip), first, count);
+  }
 
   [[nodiscard]] std::shared_ptr<const RepeatGroup> group(std::size_t g) const {
     if (auto found = cache_.find(g)) return found;

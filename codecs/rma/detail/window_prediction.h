@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "kinespace/codecs/stream/clip_table.h"
-#include "kinespace/entropy/value_coder.h"
+#include "kinespace/entropy/integer_coder.h"
 
 namespace kinespace {
 
