@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/synthesis_output.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 #include "kinespace/synthesis/interpolation.h"
 
@@ -44,7 +45,8 @@ void add_blend(CLI::App& app, Session& session) {
   const auto options = std::make_shared<BlendCommandOptions>();
   command->add_option("LIB", options->library, "The library")->required();
   command->add_option("CLIP", options->clips, "Clips, in the order the curve passes through them")->required();
-  command->add_option("-o,--output", options->output.file, "The file to write: .bvh, .amc, .glb or .gltf")->required();
+  command->add_option("-o,--output", options->output.file, "The file to write: " + listed(clip_endings_written()))
+      ->required();
   CLI::Option* weights =
       command->add_option("--weights", options->weights, "A plain blend: one weight a clip")->delimiter(',');
   command->add_option("--at", options->blend.at, "One point of the curve: 0 is the first clip, 1 the second, ..")

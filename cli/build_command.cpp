@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "kinespace/library/library_builder.h"
+#include "kinespace/motion/file_formats.h"
 
 namespace kinespace::cli {
 namespace {
@@ -82,7 +83,9 @@ void add_build(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("build", "Make a motion-space library of clips");
   const auto options = std::make_shared<BuildOptions>();
   LibraryBuilderOptions& library = options->library;
-  command->add_option("CLIPS", options->inputs, "Clips (.bvh, .amc), or folders with clips anywhere below them")
+  command
+      ->add_option("CLIPS", options->inputs,
+                   fmt::format("Clips ({}), or folders with clips anywhere below them", listed(clip_endings_read())))
       ->required();
   command->add_option("-o,--output", options->output, "The library to make, LIB.kspace")->required();
   command->add_flag("--add", library.add, "Add to the library that is there instead of replacing it");

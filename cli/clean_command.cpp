@@ -8,6 +8,7 @@
 #include "kinespace/base/file.h"
 #include "kinespace/footskate/cleanup.h"
 #include "kinespace/footskate/contact_labels.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 #include "kinespace/motion/strip.h"
 
@@ -82,8 +83,9 @@ void run_clean(const CleanCommandOptions& options, Session& session) {
 void add_clean(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("clean", "Take foot skate out: feet that stand stay where they stand");
   const auto options = std::make_shared<CleanCommandOptions>();
-  command->add_option("IN", options->input, "The clip: .bvh or .amc")->required();
-  command->add_option("-o,--output", options->output, "The file to write: .bvh, .amc, .glb or .gltf")->required();
+  command->add_option("IN", options->input, "The clip: " + listed(clip_endings_read()))->required();
+  command->add_option("-o,--output", options->output, "The file to write: " + listed(clip_endings_written()))
+      ->required();
   command->add_option("--feet", options->feet, "The ankle joints as LEFT,RIGHT; found by name and shape otherwise");
   command->add_option("--floor", options->floor_cm, "The floor is flat at this height in cm; estimated otherwise");
   command->add_option("--library", options->library, "Use the contact labels of this library (kinespace contacts)");

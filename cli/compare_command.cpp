@@ -5,6 +5,7 @@
 #include "cli/json_output.h"
 #include "kinespace/footskate/skate_measures.h"
 #include "kinespace/motion/error_measures.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
@@ -55,7 +56,7 @@ void run_compare(const CompareOptions& options, Session& session) {
 void add_compare(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("compare", "How far clip B is from the reference clip A");
   const auto options = std::make_shared<CompareOptions>();
-  command->add_option("A", options->reference, "The reference: .bvh or .amc")->required();
+  command->add_option("A", options->reference, "The reference: " + listed(clip_endings_read()))->required();
   command->add_option("B", options->other, "The clip to judge; joints are matched by name")->required();
   command->add_flag("--json", options->json, "Print the measures as one JSON object");
   session.files.reads(command, {"A", "B"});

@@ -15,6 +15,7 @@
 #include "kinespace/base/printable.h"
 #include "kinespace/footskate/contact_labels.h"
 #include "kinespace/library/library_view.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
@@ -168,7 +169,8 @@ void run_contacts(const ContactsOptions& options) {
 void add_contacts(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("contacts", "When feet are planted: find, and teach by labels");
   const auto options = std::make_shared<ContactsOptions>();
-  command->add_option("CLIP", options->clip, "A file, .bvh or .amc, or a clip of the library");
+  command->add_option("CLIP", options->clip,
+                      fmt::format("A file, {}, or a clip of the library", listed(clip_endings_read())));
   CLI::Option* library = command->add_option("--library", options->library, "The library that keeps labels");
   command->add_flag("--next", options->next, "Name the clip to label next, with the contacts it seems to have")
       ->needs(library);

@@ -7,6 +7,7 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "kinespace/base/file.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
@@ -41,8 +42,14 @@ void convert(const ConvertOptions& options, Session& session) {
 void add_convert(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("convert", "Convert a clip between BVH, ASF/AMC and glTF (glTF: write only)");
   const auto options = std::make_shared<ConvertOptions>();
-  command->add_option("IN", options->input, "A .bvh file, or an .amc file with its .asf beside it")->required();
-  command->add_option("OUT", options->output, "Where to: .bvh, .amc (writes the .asf too), .glb or .gltf")->required();
+  command
+      ->add_option("IN", options->input,
+                   fmt::format("A {} file; an .amc with its .asf beside it", listed(clip_endings_read())))
+      ->required();
+  command
+      ->add_option("OUT", options->output,
+                   fmt::format("Where to: {}; an .amc writes the .asf too", listed(clip_endings_written())))
+      ->required();
   command->add_option("--asf", options->asf, "The skeleton of an .amc input");
   command->add_flag("--json", options->json, "Print what was written as JSON");
   session.files.reads(command, {"IN", "--asf"});

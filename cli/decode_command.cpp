@@ -18,6 +18,7 @@
 #include "kinespace/base/file.h"
 #include "kinespace/base/printable.h"
 #include "kinespace/codecs/registry.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
@@ -126,8 +127,8 @@ class FileNames {
 
 // OUT is a file for a single clip with an ending that can be written, else a folder.
 std::vector<fs::path> output_files(const std::vector<Clip>& clips, const DecodeOptions& options) {
-  if (!is_motion_file(options.output) && options.output.extension() != ".glb" &&
-      options.output.extension() != ".gltf") {
+  const FileFormat* format = find_format(options.output);
+  if (format == nullptr || format->write == nullptr) {
     std::vector<fs::path> out;
     FileNames names(options.format);
     for (const Clip& clip : clips) out.push_back(options.output / names.make(clip.name));
@@ -171,7 +172,9 @@ void add_decode(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("decode", "Clips out of a stream, all or one or a part of one");
   const auto options = std::make_shared<DecodeOptions>();
   command->add_option("IN", options->stream, "The stream (.ksm), whole or its beginning")->required();
-  command->add_option("-o,--output", options->output, "A folder, or for one clip a .bvh, .amc, .glb or .gltf file")
+  command
+      ->add_option("-o,--output", options->output,
+                   "A folder, or for one clip a file: " + listed(clip_endings_written()))
       ->required();
   command->add_option("--clip", options->clip, "Only the clip of that name");
   command->add_option("--from", options->from_s, "From this time on, in seconds")->check(CLI::NonNegativeNumber);
@@ -184,7 +187,7 @@ void add_decode(CLI::App& app, Session& session) {
       ->excludes("--from")
       ->excludes("--to");
   command->add_option("--format", options->format, "Ending of the files in a folder")
-      ->check(CLI::IsMember({".bvh", ".amc", ".glb", ".gltf"}));
+      ->check(CLI::IsMember(clip_endings_written()));
   command->add_flag("--json", options->json, "Print what was decoded as one JSON object");
   session.files.reads(command, {"IN", "--basis"});
   session.files.writes(command, {"--output"});

@@ -19,6 +19,7 @@
 #include "kinespace/codecs/registry.h"
 #include "kinespace/codecs/stream/clip_error.h"
 #include "kinespace/library/library_builder.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
@@ -51,8 +52,9 @@ std::vector<fs::path> input_files(const std::vector<fs::path>& inputs) {
       if (entry.is_regular_file() && is_motion_file(entry.path())) files.push_back(entry.path());
     }
     if (files.empty()) {
-      throw Error(ErrorKind::bad_input,
-                  {.file = input.string(), .found = "no motion files", .expected = "a folder of .bvh or .amc files"});
+      throw Error(ErrorKind::bad_input, {.file = input.string(),
+                                         .found = "no motion files",
+                                         .expected = fmt::format("a folder of {} files", listed(clip_endings_read()))});
     }
     std::ranges::sort(files);
     out.insert(out.end(), files.begin(), files.end());
@@ -159,7 +161,8 @@ std::vector<std::string> codec_names() {
 void add_encode(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("encode", "Compress clips of one skeleton into a stream");
   const auto options = std::make_shared<EncodeOptions>();
-  command->add_option("IN", options->inputs, "Clips (.bvh, .amc) or folders of them")->required();
+  command->add_option("IN", options->inputs, fmt::format("Clips ({}) or folders of them", listed(clip_endings_read())))
+      ->required();
   command->add_option("-o,--output", options->output, "The stream to write (.ksm)")->required();
   command->add_option("--codec", options->codec, "How")->check(CLI::IsMember(codec_names()));
   CLI::Option_group* target = command->add_option_group("target", "At most one");

@@ -8,6 +8,7 @@
 #include "cli/json_output.h"
 #include "kinespace/base/file.h"
 #include "kinespace/library/library_view.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace::cli {
@@ -67,7 +68,8 @@ void add_export(CLI::App& app, Session& session) {
   const auto options = std::make_shared<ExportOptions>();
   command->add_option("LIB", options->library, "The library")->required();
   command->add_option("CLIP", options->clip, "The clip's name")->required();
-  command->add_option("-o,--output", options->output, "The file to write: .bvh, .amc, .glb or .gltf")->required();
+  command->add_option("-o,--output", options->output, "The file to write: " + listed(clip_endings_written()))
+      ->required();
   CLI::Option* lod =
       command->add_option("--lod", options->functions, "Use only the first N functions")->check(CLI::NonNegativeNumber);
   command

@@ -1,36 +1,25 @@
 #include "cli/file_options.h"
 
 #include <algorithm>
-#include <array>
 #include <string>
-#include <string_view>
 #include <utility>
 
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
-#include "kinespace/motion/text.h"
 
 namespace kinespace::cli {
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Ending {
-  std::string_view text;
-  FileKind kind;
-};
-
-constexpr std::array endings = {
-    Ending{".bvh", FileKind::bvh},   Ending{".amc", FileKind::amc},    Ending{".asf", FileKind::asf},
-    Ending{".glb", FileKind::glb},   Ending{".gltf", FileKind::json},  Ending{".svg", FileKind::svg},
-    Ending{".png", FileKind::png},   Ending{".ksm", FileKind::stream}, Ending{".kspace", FileKind::database},
-    Ending{".npy", FileKind::numpy},
-};
-
 // With what is read along with it.
 std::vector<fs::path> files_behind(const fs::path& input) {
-  if (same_word(input.extension().string(), ".npy")) return {input, input.parent_path() / "triangles.npy"};
+  const FileFormat* format = find_format(input);
+  if (format != nullptr && format->holds_meshes && !format->companion.empty()) {
+    return {input, input.parent_path() / format->companion};
+  }
   try {
     return files_read(input);
   } catch (const Error&) {
@@ -40,8 +29,8 @@ std::vector<fs::path> files_behind(const fs::path& input) {
 
 // With what is written along with it.
 std::vector<fs::path> files_made(const fs::path& output) {
-  if (!same_word(output.extension().string(), ".amc")) return {output};
-  return {output, fs::path(output).replace_extension(".asf")};
+  const FileFormat* format = find_format(output);
+  return format != nullptr && format->write != nullptr ? files_written(output) : std::vector<fs::path>{output};
 }
 
 bool same_place(const fs::path& a, const fs::path& b) {
@@ -72,10 +61,9 @@ void require_place_for(const fs::path& output, std::optional<FileKind> kind) {
 }  // namespace
 
 std::optional<FileKind> kind_by_ending(const fs::path& path) {
-  const std::string ending = path.extension().string();
-  const auto known = std::ranges::find_if(endings, [&](const Ending& e) { return same_word(ending, e.text); });
-  if (known == endings.end()) return std::nullopt;
-  return known->kind;
+  const FileFormat* format = find_format(path);
+  if (format == nullptr || format->kind == FileKind::other) return std::nullopt;
+  return format->kind;
 }
 
 void FileOptions::add(CLI::App* command, std::initializer_list<const char*> names, FileOption::Role role,

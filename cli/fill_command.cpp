@@ -11,6 +11,7 @@
 #include "cli/output.h"
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 #include "kinespace/motion/strip.h"
 #include "kinespace/synthesis/filling.h"
@@ -146,8 +147,9 @@ void run_fill(const FillCommandOptions& options, Session& session) {
 void add_fill(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("fill", "Estimate missing frames of a clip from a library of motions");
   const auto options = std::make_shared<FillCommandOptions>();
-  command->add_option("IN", options->input, "The clip: .bvh or .amc")->required();
-  command->add_option("-o,--output", options->output, "The file to write: .bvh, .amc, .glb or .gltf")->required();
+  command->add_option("IN", options->input, "The clip: " + listed(clip_endings_read()))->required();
+  command->add_option("-o,--output", options->output, "The file to write: " + listed(clip_endings_written()))
+      ->required();
   command->add_option("--library", options->library, "The library to learn from")->required();
   command->add_option("--from", options->from_s,
                       "First missing time in seconds; else frames are looked for that "

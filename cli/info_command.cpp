@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
@@ -17,6 +19,7 @@
 #include "kinespace/base/printable.h"
 #include "kinespace/codecs/registry.h"
 #include "kinespace/library/library_view.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/plausibility.h"
 #include "kinespace/motion/read.h"
 
@@ -224,7 +227,8 @@ void add_info(CLI::App& app, Session& session) {
   command
       ->add_option(
           "FILE", options->files,
-          "A clip (.bvh, .amc), a library (.kspace) or a stream (.ksm); with --repeats clips and folders of them")
+          fmt::format("A clip ({}), a library (.kspace) or a stream (.ksm); with --repeats clips and folders of them",
+                      listed(clip_endings_read())))
       ->required();
   command->add_option("--basis", options->basis, "The library that a stream was encoded with, if it was with one");
   command->add_option("--limit", options->limit, "List at most so many clips; 0: all (--json always lists all)")

@@ -7,6 +7,8 @@
 #include <optional>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "kinespace/base/error.h"
@@ -17,6 +19,7 @@
 #include "kinespace/mesh/picture.h"
 #include "kinespace/mesh_codecs/basis_cache.h"
 #include "kinespace/mesh_codecs/mesh_codec.h"
+#include "kinespace/motion/file_formats.h"
 
 namespace kinespace::cli {
 namespace {
@@ -160,8 +163,9 @@ struct MeshDecodeOptions {
 };
 
 MeshFormat format_of(const fs::path& output, const std::string& format) {
-  const std::string ending = output.extension().string();
-  if (ending == ".glb" || ending == ".gltf") return MeshFormat::gltf;
+  const FileFormat* known = find_format(output);
+  const bool gltf = known != nullptr && (known->kind == FileKind::glb || known->kind == FileKind::json);
+  if (gltf) return MeshFormat::gltf;
   if (format == "obj") return MeshFormat::obj;
   if (format == "ply") return MeshFormat::ply;
   return MeshFormat::numpy;
@@ -300,7 +304,10 @@ void add_mesh_encode(CLI::App& mesh, Session& session) {
   CLI::App* command = mesh.add_subcommand("encode", "A mesh sequence as a stream (.ksm)");
   const auto options = std::make_shared<MeshEncodeOptions>();
   MeshCodecOptions& codec = options->codec_options;
-  command->add_option("IN", options->input, "A folder of OBJ, PLY or NumPy files, or a .glb or .gltf file")->required();
+  command
+      ->add_option("IN", options->input,
+                   fmt::format("A folder of OBJ, PLY or NumPy files, or a file: {}", listed(mesh_endings())))
+      ->required();
   command->add_option("-o,--output", options->output, "The stream to write")->required();
   std::vector<std::string> names(mesh_codecs().begin(), mesh_codecs().end());
   command->add_option("--codec", options->codec, "mesh-harmonics, mesh-pca or mesh-draco")

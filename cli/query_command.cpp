@@ -9,6 +9,7 @@
 #include "cli/output.h"
 #include "kinespace/base/error.h"
 #include "kinespace/base/printable.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 #include "kinespace/synthesis/retrieval.h"
 #include "kinespace/synthesis/windows.h"
@@ -103,7 +104,10 @@ void add_query(CLI::App& app, Session& session) {
   CLI::App* command = app.add_subcommand("query", "The motions of a library that are nearest to a clip");
   const auto options = std::make_shared<QueryCommandOptions>();
   command->add_option("LIB", options->library, "The library")->required();
-  command->add_option("CLIP", options->clip, "A clip of the library by its name, or a file (.bvh, .amc)")->required();
+  command
+      ->add_option("CLIP", options->clip,
+                   fmt::format("A clip of the library by its name, or a file ({})", listed(clip_endings_read())))
+      ->required();
   command->add_option("-k", options->query.k, "How many")->capture_default_str();
   command->add_flag("--no-rerank,!--rerank", options->no_rerank, "Order by the motion vectors alone, without DTW");
   command->add_option("--candidates", options->query.candidates, "How many the DTW orders again")

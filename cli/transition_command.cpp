@@ -5,6 +5,7 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/synthesis_output.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
 #include "kinespace/synthesis/transition_plan.h"
 
@@ -97,7 +98,8 @@ void add_transition(CLI::App& app, Session& session) {
   const auto options = std::make_shared<TransitionCommandOptions>();
   command->add_option("LIB", options->library, "The library")->required();
   command->add_option("CLIP", options->clips, "Two clips or more, in the order they are played")->required();
-  command->add_option("-o,--output", options->output.file, "The file to write: .bvh, .amc, .glb or .gltf")->required();
+  command->add_option("-o,--output", options->output.file, "The file to write: " + listed(clip_endings_written()))
+      ->required();
   command->add_flag("--via-graph", options->plan.via_graph,
                     "Lead through other clips where motions are far apart; the first time makes the library's graph");
   command->add_option("--max-cost", options->plan.graph.largest_cost_cm, "The farthest step of the graph, in cm")

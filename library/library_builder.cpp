@@ -13,6 +13,7 @@
 #include "kinespace/base/file.h"
 #include "kinespace/library/detail/space_codec.h"
 #include "kinespace/library/library_view.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/kinematics.h"
 #include "kinespace/motion/plausibility.h"
 #include "kinespace/motion/read.h"
@@ -345,14 +346,14 @@ std::vector<std::filesystem::path> find_motion_files(const std::vector<std::file
     } else {
       throw Error(ErrorKind::bad_input, {.file = argument.string(),
                                          .found = "not a motion file by its ending",
-                                         .expected = ".bvh or .amc",
+                                         .expected = listed(clip_endings_read()),
                                          .remedy = "name clips, or folders that hold them"});
     }
   }
   if (files.empty()) {
     throw Error(ErrorKind::bad_input, {.file = arguments.empty() ? "" : arguments.front().string(),
                                        .found = "no motion files",
-                                       .expected = "at least one .bvh or .amc"});
+                                       .expected = "at least one " + listed(clip_endings_read())});
   }
   return {files.begin(), files.end()};
 }

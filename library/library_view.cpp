@@ -12,19 +12,15 @@
 #include "kinespace/base/file.h"
 #include "kinespace/base/nearest_name.h"
 #include "kinespace/library/detail/space_codec.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/kinematics.h"
 #include "kinespace/motion/read.h"
-#include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {
 
-constexpr const char* known_endings[] = {".bvh", ".amc", ".asf", ".glb", ".gltf", ".fbx", ".c3d", ".ksm", ".kspace"};
-
 bool looks_like_a_file(const std::string& name) {
-  const std::string ending = std::filesystem::path(name).extension().string();
-  return name.find('/') != std::string::npos ||
-         std::ranges::any_of(known_endings, [&](const char* known) { return same_word(ending, known); });
+  return name.find('/') != std::string::npos || find_format(name) != nullptr;
 }
 
 double largest_distance(const JointPositions& a, const JointPositions& b) {

@@ -13,6 +13,7 @@
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
 #include "kinespace/mesh/detail/mesh_formats.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/text.h"
 
 namespace kinespace {
@@ -142,7 +143,7 @@ MeshSequence read_any(const fs::path& path, const MeshReadOptions& options) {
     return parse_gltf_mesh(file.text(), path, options);
   }
   if (!fs::exists(path, ignored)) fail(ErrorKind::bad_input, path, "no such file or folder", "a mesh sequence");
-  fail(ErrorKind::bad_input, path, "another kind of file", "a folder, .npy, .obj, .ply, .gltf or .glb");
+  fail(ErrorKind::bad_input, path, "another kind of file", "a folder, " + listed(mesh_endings()));
 }
 
 // A folder under another name, removed unless it became the one that was wanted.
@@ -258,8 +259,8 @@ void write_mesh_sequence(const fs::path& path, const MeshSequence& mesh, MeshFor
 bool may_be_mesh_sequence(const fs::path& path) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) return true;
-  const auto endings = {".npy", ".obj", ".ply", ".gltf", ".glb"};
-  return std::any_of(endings.begin(), endings.end(), [&](const char* ending) { return has_ending(path, ending); });
+  const FileFormat* format = find_format(path);
+  return format != nullptr && format->holds_meshes;
 }
 
 }  // namespace kinespace

@@ -6,37 +6,28 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "kinespace/base/error.h"
-#include "kinespace/motion/amc.h"
-#include "kinespace/motion/bvh.h"
-#include "kinespace/motion/gltf.h"
+#include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/text.h"
 
 namespace kinespace {
 namespace {
 
-bool has_ending(const std::filesystem::path& path, std::string_view ending) {
-  return same_word(path.extension().string(), ending);
-}
-
-constexpr const char* writable_endings = ".bvh, .amc, .glb or .gltf";
-
-bool can_write(const std::filesystem::path& path) {
-  return is_motion_file(path) || has_ending(path, ".glb") || has_ending(path, ".gltf");
-}
-
-std::vector<std::filesystem::path> skeleton_files(const std::filesystem::path& folder) {
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder, std::string_view ending) {
   std::vector<std::filesystem::path> out;
   std::error_code code;
   for (const auto& entry : std::filesystem::directory_iterator(folder, code)) {
-    if (has_ending(entry.path(), ".asf")) out.push_back(entry.path());
+    if (same_word(entry.path().extension().string(), ending)) out.push_back(entry.path());
   }
   return out;
 }
 
-std::filesystem::path skeleton_of(const std::filesystem::path& amc) {
-  const auto candidates = skeleton_files(amc.has_parent_path() ? amc.parent_path() : ".");
-  const std::string name = amc.stem().string();
+// The file that goes with a clip: of those with the ending beside it the one whose name starts the clip's, else the only one.
+std::filesystem::path companion_of(const std::filesystem::path& clip, std::string_view ending) {
+  const auto candidates = files_of(clip.has_parent_path() ? clip.parent_path() : ".", ending);
+  const std::string name = clip.stem().string();
   const std::filesystem::path* best = nullptr;
   for (const auto& candidate : candidates) {
     const std::string stem = candidate.stem().string();
@@ -44,12 +35,13 @@ std::filesystem::path skeleton_of(const std::filesystem::path& amc) {
   }
   if (best != nullptr) return *best;
   if (candidates.size() == 1) return candidates.front();
-  throw Error(ErrorKind::bad_input, {.file = amc.string(),
-                                     .found = candidates.empty() ? "no .asf file beside it"
-                                                                 : std::to_string(candidates.size()) +
-                                                                       " .asf files beside it, none of its name",
-                                     .expected = "the skeleton of the motion",
-                                     .remedy = "put the .asf file beside it or name it"});
+  throw Error(
+      ErrorKind::bad_input,
+      {.file = clip.string(),
+       .found = candidates.empty() ? fmt::format("no {} file beside it", ending)
+                                   : fmt::format("{} {} files beside it, none of its name", candidates.size(), ending),
+       .expected = "the skeleton of the motion",
+       .remedy = fmt::format("put the {} file beside it or name it", ending)});
 }
 
 // What is there in place of a motion file, and what to do about it.
@@ -58,49 +50,54 @@ std::pair<std::string, std::string> in_its_place(ErrorKind kind, const std::file
   if (std::filesystem::is_directory(path, ignored)) return {"a folder", "name a file in it"};
   const bool input = kind == ErrorKind::bad_input;
   if (input && !std::filesystem::exists(path, ignored)) return {"no such file", "check the path"};
-  if (has_ending(path, ".asf")) return {"the ending \".asf\"", "name the .amc file; its .asf is found"};
-  if (input && (has_ending(path, ".glb") || has_ending(path, ".gltf"))) {
-    return {"a glTF file, which is written only", "give the clip that it was made of"};
-  }
+  const FileFormat* format = find_format(path);
+  const bool of_other_use = format != nullptr && !format->instead.empty() && (input || format->write == nullptr);
+  if (of_other_use) return {std::string(format->instead), std::string(format->remedy)};
   const std::string ending = path.extension().string();
   return {ending.empty() ? "no ending" : "the ending \"" + ending + "\"", ""};
 }
 
-[[noreturn]] void fail_ending(ErrorKind kind, const std::filesystem::path& path, const std::string& expected) {
+[[noreturn]] void fail_ending(ErrorKind kind, const std::filesystem::path& path) {
   auto [found, remedy] = in_its_place(kind, path);
-  throw Error(kind,
-              {.file = path.string(), .found = std::move(found), .expected = expected, .remedy = std::move(remedy)});
+  throw Error(kind, {.file = path.string(),
+                     .found = std::move(found),
+                     .expected = kind == ErrorKind::bad_input ? "a motion file: " + listed(clip_endings_read())
+                                                              : listed(clip_endings_written()),
+                     .remedy = std::move(remedy)});
 }
 
 }  // namespace
 
-Clip read_clip(const std::filesystem::path& path, const std::optional<std::filesystem::path>& asf) {
-  if (has_ending(path, ".bvh")) return read_bvh(path);
-  if (has_ending(path, ".amc")) return read_amc(path, asf ? *asf : skeleton_of(path));
-  fail_ending(ErrorKind::bad_input, path, "a motion file: .bvh or .amc");
+Clip read_clip(const std::filesystem::path& path, const std::optional<std::filesystem::path>& companion) {
+  const FileFormat* format = find_format(path);
+  if (format == nullptr || format->read == nullptr) fail_ending(ErrorKind::bad_input, path);
+  if (format->companion.empty()) return format->read(path, {});
+  return format->read(path, companion ? *companion : companion_of(path, format->companion));
 }
 
 void write_clip(const std::filesystem::path& path, const Clip& clip) {
-  if (has_ending(path, ".bvh")) return write_bvh(path, clip);
-  if (has_ending(path, ".amc")) return write_amc(path, clip);
-  if (has_ending(path, ".glb") || has_ending(path, ".gltf")) return write_gltf(path, clip);
-  fail_ending(ErrorKind::usage, path, writable_endings);
+  const FileFormat* format = find_format(path);
+  if (format == nullptr || format->write == nullptr) fail_ending(ErrorKind::usage, path);
+  format->write(path, clip);
 }
 
 std::vector<std::filesystem::path> files_read(const std::filesystem::path& path,
-                                              const std::optional<std::filesystem::path>& asf) {
-  if (!has_ending(path, ".amc")) return {path};
-  return {path, asf ? *asf : skeleton_of(path)};
+                                              const std::optional<std::filesystem::path>& companion) {
+  const FileFormat* format = find_format(path);
+  if (format == nullptr || format->read == nullptr || format->companion.empty()) return {path};
+  return {path, companion ? *companion : companion_of(path, format->companion)};
 }
 
 std::vector<std::filesystem::path> files_written(const std::filesystem::path& path) {
-  if (has_ending(path, ".amc")) return {path, std::filesystem::path(path).replace_extension(".asf")};
-  if (!can_write(path)) fail_ending(ErrorKind::usage, path, writable_endings);
-  return {path};
+  const FileFormat* format = find_format(path);
+  if (format == nullptr || format->write == nullptr) fail_ending(ErrorKind::usage, path);
+  if (format->companion.empty()) return {path};
+  return {path, std::filesystem::path(path).replace_extension(format->companion)};
 }
 
 bool is_motion_file(const std::filesystem::path& path) {
-  return has_ending(path, ".bvh") || has_ending(path, ".amc");
+  const FileFormat* format = find_format(path);
+  return format != nullptr && format->read != nullptr;
 }
 
 }  // namespace kinespace

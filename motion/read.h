@@ -1,4 +1,4 @@
-// Motion files in and out, by their ending.
+// Motion files in and out, by their ending (motion/file_formats.h).
 #pragma once
 
 #include <filesystem>
@@ -9,17 +9,18 @@
 
 namespace kinespace {
 
-// Reads .bvh, or .amc with its .asf: `asf` when given, else the .asf file beside it whose name starts the AMC's
+// Reads a clip; .amc with its .asf: `companion` when given, else the .asf file beside it whose name starts the AMC's
 // (01_02.amc -> 01.asf; the longest such name), else the only .asf in the folder. Throws Error.
-[[nodiscard]] Clip read_clip(const std::filesystem::path& path, const std::optional<std::filesystem::path>& asf = {});
+[[nodiscard]] Clip read_clip(const std::filesystem::path& path,
+                             const std::optional<std::filesystem::path>& companion = {});
 
-// Writes .bvh, .amc (with an .asf beside it), .glb or .gltf. The file is whole or not there. Throws Error.
+// Writes a clip; .amc with an .asf beside it. The file is whole or not there. Throws Error.
 void write_clip(const std::filesystem::path& path, const Clip& clip);
 
 // The files that read_clip would read, and those that write_clip would write: an .amc goes with an .asf. For a caller
 // who must not overwrite an input. Throw Error: no skeleton beside an .amc, an ending that cannot be written.
 [[nodiscard]] std::vector<std::filesystem::path> files_read(const std::filesystem::path& path,
-                                                            const std::optional<std::filesystem::path>& asf = {});
+                                                            const std::optional<std::filesystem::path>& companion = {});
 [[nodiscard]] std::vector<std::filesystem::path> files_written(const std::filesystem::path& path);
 
 // True for endings that read_clip takes.
