@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-DOCUMENTS = ["README.md", "docs/synthesis.md", "docs/compression.md"]
+DOCUMENTS = ["README.md", "docs/synthesis.md", "docs/compression.md", "docs/files.md"]
 # What a reader brings, and the bench of it, which takes minutes: its options are looked at all the same, by tests/cli.
 NOT_RUN = re.compile(r"kinespace bench ")
 # What depends on the machine and the moment.
@@ -90,7 +90,9 @@ def self_test():
 
 
 def prepare(folder, environment):
-    """The sample clips, a library of them, and the files that the documents take for a reader's own."""
+    """The sample clips, a library of them, the files that the documents take for a reader's own, and the folders of the checkout that they name."""
+    for name in ("examples", "tests"):
+        (folder / name).symlink_to(ROOT / name)
     run = lambda line: subprocess.run(line, shell=True, cwd=folder, env=environment, check=True, capture_output=True)
     run("kinespace-samples clips")
     run("kinespace build clips -o sample.kspace --quiet")
