@@ -16,7 +16,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-DOCUMENTS = ["README.md", "docs/synthesis.md", "docs/compression.md", "docs/architecture.md", "docs/files.md"]
+DOCUMENTS = ["README.md", "docs/synthesis.md", "docs/compression.md", "docs/architecture.md", "docs/files.md", "SECURITY.md"]
 # What a reader brings, and the bench of it, which takes minutes: its options are looked at all the same, by tests/cli.
 NOT_RUN = re.compile(r"kinespace bench ")
 # What depends on the machine and the moment.
