@@ -7,6 +7,8 @@ An example is an indented block with lines "$ kinespace ..."; the lines below on
 numbers to the digits that are shown (one unit of the last digit may differ: another processor rounds otherwise). Every command must end with 0,
 unless what is shown is an error. A comment behind a command may tell a file's size ("# 1238 bytes"). First the comparison is shown to fail on what
 differs; then the documents are run, each in an empty folder of its own with the sample clips.
+
+Of all documents, run or not, the files that they link to and the sources that they name (`fpca/warp.h`) must be there.
 """
 import os
 import pathlib
@@ -16,7 +18,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-DOCUMENTS = ["README.md", "docs/synthesis.md", "docs/compression.md"]
+DOCUMENTS = ["README.md", "docs/synthesis.md", "docs/compression.md", "docs/architecture.md", "docs/files.md", "SECURITY.md"]
 # What a reader brings, and the bench of it, which takes minutes: its options are looked at all the same, by tests/cli.
 NOT_RUN = re.compile(r"kinespace bench ")
 # What depends on the machine and the moment.
@@ -89,8 +91,31 @@ def self_test():
     return [f"{x} passes" for x in bad if difference(x, printed) is None] + [f"{x} fails" for x in good if difference(x, printed)]
 
 
+def dead_names(text, folder, root=ROOT):
+    """The files that a document in `folder` links to or names, and that are not there."""
+    links = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text)
+    names = re.findall(r"`((?:[a-z_]+/)+[a-z0-9_]+\.(?:h|cpp|cl|py))`", text)
+    places = {link: [folder / link] for link in links}
+    for name in names:  # as from the root of the checkout, or as headers are included
+        included = name.removeprefix("kinespace/")
+        places[name] = [root / name, root / included, root / "include" / included, root / "include" / (included + ".in")]
+    return [name for name, found in places.items() if not any(place.exists() for place in found)]
+
+
+def all_dead_names():
+    good = "[a](README.md#why) [b](https://x.y/z.h) `fpca/warp.h` `kinespace/fpca/warp.h` `kinespace/version.h` `a.h`"
+    wrong = [f"the check of names is broken: {name}" for name in dead_names(good, ROOT)]
+    wrong += [] if len(dead_names("[a](GONE.md) `fpca/gone.h`", ROOT)) == 2 else ["the check of names sees nothing"]
+    for document in [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/*.md"), *ROOT.glob("tests/**/*.md")]:
+        dead = dead_names(document.read_text(encoding="utf-8"), document.parent)
+        wrong += [f"{document.relative_to(ROOT)}: no such file: {name}" for name in dead]
+    return wrong
+
+
 def prepare(folder, environment):
-    """The sample clips, a library of them, and the files that the documents take for a reader's own."""
+    """The sample clips, a library of them, the files that the documents take for a reader's own, and the folders of the checkout that they name."""
+    for name in ("examples", "tests"):
+        (folder / name).symlink_to(ROOT / name)
     run = lambda line: subprocess.run(line, shell=True, cwd=folder, env=environment, check=True, capture_output=True)
     run("kinespace-samples clips")
     run("kinespace build clips -o sample.kspace --quiet")
@@ -132,7 +157,7 @@ def findings(document, build):
 
 def main():
     build = pathlib.Path(sys.argv[1]).resolve()
-    wrong = [f"the comparison itself is broken: {b}" for b in self_test()]
+    wrong = [f"the comparison itself is broken: {b}" for b in self_test()] + all_dead_names()
     for document in sys.argv[2:] or DOCUMENTS:
         wrong += [] if examples((ROOT / document).read_text(encoding="utf-8")) else [f"{document}: no examples"]
         wrong += findings(document, build)
