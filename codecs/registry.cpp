@@ -96,11 +96,10 @@ std::unique_ptr<StreamReader> open_stream(std::span<const std::byte> bytes, std:
                                           const PoseSpaceBasis* basis) {
   Bitstream stream = Bitstream::parse_prefix(bytes, std::move(source));
   const std::string kind = stream.kind();
-  if (basis != nullptr && kind == stream_kind(PoseSpaceCodec().name())) {
-    return PoseSpaceCodec().open(std::move(stream), basis);
-  }
   for (const Codec* codec : all_codecs()) {
-    if (kind == stream_kind(codec->name())) return codec->open(std::move(stream));
+    if (kind != stream_kind(codec->name())) continue;
+    static_cast<void>(payload_version(stream, codec->versions()));
+    return codec->open_with(basis, std::move(stream));
   }
   throw Error(ErrorKind::bad_input, {.file = stream.source(),
                                      .found = "a stream of kind " + kind,

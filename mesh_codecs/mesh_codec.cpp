@@ -14,12 +14,45 @@
 #include "kinespace/mesh_codecs/detail/trajectory_pca.h"
 #include "kinespace/mesh_codecs/harmonics_stream.h"
 #include "kinespace/mesh_codecs/mesh_layout.h"
+#include "kinespace/storage/payload_version.h"
 
 namespace kinespace {
 namespace {
 
 constexpr std::string_view kind_prefix = "mesh-codec:";
-constexpr std::array<std::string_view, 3> names{"mesh-harmonics", "mesh-pca", "mesh-draco"};
+
+// A codec: how it encodes, how its streams are opened. The one with two profiles writes and opens either.
+struct MeshCodecRow {
+  std::string_view name;
+  Bytes (*encode)(const MeshSequence& mesh, const MeshCodecOptions& options) = nullptr;
+  std::unique_ptr<MeshStreamReader> (*open)(Bitstream stream, BasisCache* cache) = nullptr;
+  bool takes_bases = false;  // profile, bases, clusters, coarse vertices
+  std::span<const PayloadVersion> versions = first_payload;
+};
+
+Bytes encode_either_harmonics(const MeshSequence& mesh, const MeshCodecOptions& options) {
+  return options.profile == MeshProfile::paper ? encode_paper_harmonics(mesh, options)
+                                               : encode_harmonics(mesh, options);
+}
+
+std::unique_ptr<MeshStreamReader> open_either_harmonics(Bitstream stream, BasisCache* cache) {
+  const std::string* profile = stream.find_option("profile");
+  return profile != nullptr && *profile == "paper" ? open_paper_harmonics(std::move(stream), cache)
+                                                   : open_harmonics(std::move(stream), cache);
+}
+
+constexpr std::array rows{
+    MeshCodecRow{"mesh-harmonics", encode_either_harmonics, open_either_harmonics, true},
+    MeshCodecRow{"mesh-pca", encode_trajectory_pca,
+                 [](Bitstream stream, BasisCache*) { return open_trajectory_pca(std::move(stream)); }},
+    MeshCodecRow{"mesh-draco", encode_draco_frames,
+                 [](Bitstream stream, BasisCache*) { return open_draco_frames(std::move(stream)); }},
+};
+constexpr auto names = [] {
+  std::array<std::string_view, rows.size()> out;
+  for (std::size_t i = 0; i < rows.size(); ++i) out[i] = rows[i].name;
+  return out;
+}();
 
 [[noreturn]] void out_of_range(const char* field, double value, std::string range) {
   throw Error(ErrorKind::usage,
@@ -72,20 +105,18 @@ Bytes encode_mesh(std::string_view codec, const MeshSequence& mesh, const MeshCo
   require_valid(mesh, mesh.name);
   options.validate(mesh);
   require_encodable(mesh);
-  if (codec == names[0]) {
-    return options.profile == MeshProfile::paper ? encode_paper_harmonics(mesh, options)
-                                                 : encode_harmonics(mesh, options);
+  const auto row = std::ranges::find(rows, codec, &MeshCodecRow::name);
+  if (row == rows.end()) {
+    throw Error(ErrorKind::usage,
+                {.found = fmt::format("mesh codec {}", codec), .expected = fmt::format("{}", fmt::join(names, ", "))});
   }
-  const bool harmonics_only = options.profile != MeshProfile::standard || options.bases > 0 || options.clusters > 0 ||
-                              options.coarse_vertices > 0;
-  if (harmonics_only && std::find(names.begin(), names.end(), codec) != names.end()) {
+  const bool with_bases = options.profile != MeshProfile::standard || options.bases > 0 || options.clusters > 0 ||
+                          options.coarse_vertices > 0;
+  if (with_bases && !row->takes_bases) {
     throw Error(ErrorKind::usage, {.found = fmt::format("profile, bases, clusters or coarse vertices for {}", codec),
                                    .expected = "these with mesh-harmonics only"});
   }
-  if (codec == names[1]) return encode_trajectory_pca(mesh, options);
-  if (codec == names[2]) return encode_draco_frames(mesh, options);
-  throw Error(ErrorKind::usage,
-              {.found = fmt::format("mesh codec {}", codec), .expected = fmt::format("{}", fmt::join(names, ", "))});
+  return row->encode(mesh, options);
 }
 
 bool is_mesh_stream(std::span<const std::byte> bytes) {
@@ -98,13 +129,11 @@ std::unique_ptr<MeshStreamReader> open_mesh_stream(std::span<const std::byte> by
   const std::string& kind = stream.kind();
   const std::string_view codec =
       kind.starts_with(kind_prefix) ? std::string_view(kind).substr(kind_prefix.size()) : std::string_view();
-  const std::string* profile = stream.find_option("profile");
-  if (codec == names[0]) {
-    return profile != nullptr && *profile == "paper" ? open_paper_harmonics(std::move(stream), cache)
-                                                     : open_harmonics(std::move(stream), cache);
+  const auto row = std::ranges::find(rows, codec, &MeshCodecRow::name);
+  if (row != rows.end()) {
+    static_cast<void>(payload_version(stream, row->versions));
+    return row->open(std::move(stream), cache);
   }
-  if (codec == names[1]) return open_trajectory_pca(std::move(stream));
-  if (codec == names[2]) return open_draco_frames(std::move(stream));
   throw Error(ErrorKind::bad_input, {.file = stream.source(),
                                      .found = "a stream of kind " + kind,
                                      .expected = "a stream of a mesh sequence by a codec that this build knows"});

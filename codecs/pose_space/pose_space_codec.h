@@ -37,7 +37,7 @@ class PoseSpaceCodec final : public Codec {
   // With tables that a library has instead of tables of the stream's own (CodecOptions::basis). The shell error is then
   // what the basis gives: near shell_ratio times the mean, but not held to it. `basis` must outlive the call only.
   // Throws Error{usage} when the stream was made with another basis, or the basis is missing.
-  [[nodiscard]] std::unique_ptr<StreamReader> open(Bitstream stream, const PoseSpaceBasis* basis) const;
+  [[nodiscard]] std::unique_ptr<StreamReader> open_with(const PoseSpaceBasis* basis, Bitstream stream) const override;
 };
 
 }  // namespace kinespace

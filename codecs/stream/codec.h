@@ -23,6 +23,7 @@
 #include "kinespace/base/progress.h"
 #include "kinespace/motion/clip.h"
 #include "kinespace/storage/bitstream.h"
+#include "kinespace/storage/payload_version.h"
 
 namespace kinespace {
 
@@ -120,6 +121,8 @@ class Codec {
 
   [[nodiscard]] virtual std::string_view name() const = 0;
   [[nodiscard]] virtual std::span<const CodecSetting> settings() const = 0;
+  // Those of its streams that this build reads.
+  [[nodiscard]] virtual std::span<const PayloadVersion> versions() const { return first_payload; }
   // Whether CodecOptions::basis may be given.
   [[nodiscard]] virtual bool takes_basis() const { return false; }
   // Options have been checked. Throws Error{usage} when the target cannot be met, Error{bad_input} for clips that
@@ -127,6 +130,11 @@ class Codec {
   [[nodiscard]] virtual Bytes encode(std::span<const Clip> clips, const CodecOptions& options) const = 0;
   // The stream's bytes must outlive the reader.
   [[nodiscard]] virtual std::unique_ptr<StreamReader> open(Bitstream stream) const = 0;
+  // The same with the tables that a stream may leave out, for codecs that take them; nullptr: none.
+  [[nodiscard]] virtual std::unique_ptr<StreamReader> open_with(const PoseSpaceBasis* /*basis*/,
+                                                                Bitstream stream) const {
+    return open(std::move(stream));
+  }
 
  protected:
   // The value of one of settings().

@@ -4,6 +4,7 @@
 
 #include "kinespace/base/error.h"
 #include "tests/codecs/sample_stream.h"
+#include "tests/support/forged_stream.h"
 
 namespace kinespace {
 namespace {
@@ -27,6 +28,33 @@ TEST(Registry, every_codec_brings_every_clip_back_within_a_bound_and_opens_by_it
     const auto reader = open_stream(stream, "s");
     EXPECT_EQ(reader->clips().size(), clips.size());
     EXPECT_LE(test::error_of(clips, reader->decode_all()).mean_cm(), 0.7) << codec->name();
+  }
+}
+
+TEST(Registry, a_payload_of_a_later_version_is_refused_by_its_number) {
+  for (const Codec* codec : all_codecs()) {
+    const std::vector<Clip> clips{slice(test::sample_clips().front(), 0, 40)};
+    const Bytes stream = encode(codec->name(), clips);
+    const auto error_at = [&](std::int64_t version) {
+      const Bytes told = test::with_option(stream, "payload", std::to_string(version));
+      try {
+        return open_stream(told, "later.ksm")->clips().size() == 1 ? std::string() : "another number of clips";
+      } catch (const Error& error) {
+        EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+        return std::string(error.what());
+      }
+    };
+    const int newest = codec->versions().back().number;
+    EXPECT_EQ(error_at(newest), "") << codec->name();
+    const std::string later = error_at(newest + 1);
+    EXPECT_NE(later.find("later.ksm"), std::string::npos) << later;
+    EXPECT_NE(later.find("version " + std::to_string(newest + 1)), std::string::npos) << later;
+    EXPECT_NE(later.find("newer kinespace"), std::string::npos) << later;
+    EXPECT_NE(error_at(0), "");
+    for (std::size_t v = 0; v < codec->versions().size(); ++v) {
+      EXPECT_EQ(codec->versions()[v].number, static_cast<int>(v) + 1) << "append only, one after the other";
+      EXPECT_FALSE(codec->versions()[v].reason.empty());
+    }
   }
 }
 

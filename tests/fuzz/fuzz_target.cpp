@@ -1,4 +1,4 @@
-// libFuzzer's entry points for decoders of streams.
+// libFuzzer's entry points for decoders of streams. The argument -codecs lists what KINESPACE_FUZZ_CODEC may be.
 //
 // The first byte of the input chooses what the rest is: a whole stream, or the content of one part of a good stream,
 // under checksums that fit - or nothing would ever get past them.
@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -31,8 +33,19 @@ void decode_or_error(std::span<const std::byte> bytes) {
 }  // namespace
 }  // namespace kinespace::fuzz
 
+std::string kinespace::fuzz::codec() {
+  const char* const named = std::getenv("KINESPACE_FUZZ_CODEC");
+  if (named != nullptr && *named != 0) return named;
+  std::fputs("KINESPACE_FUZZ_CODEC names no codec; -codecs lists them\n", stderr);
+  std::exit(2);
+}
+
 // Before any input is timed.
-extern "C" int LLVMFuzzerInitialize(int* /*count*/, char*** /*arguments*/) {
+extern "C" int LLVMFuzzerInitialize(int* count, char*** arguments) {
+  if (*count == 2 && std::string((*arguments)[1]) == "-codecs") {
+    for (const std::string& name : kinespace::fuzz::codecs()) std::printf("%s\n", name.c_str());
+    std::exit(0);
+  }
   static_cast<void>(kinespace::fuzz::parts());
   return 0;
 }

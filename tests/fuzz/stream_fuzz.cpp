@@ -1,4 +1,4 @@
-// A libFuzzer target for one clip codec's decoder, KINESPACE_FUZZ_CODEC.
+// A libFuzzer target for the decoders of clips: every codec of the registry.
 #include <algorithm>
 #include <vector>
 
@@ -8,12 +8,18 @@
 
 namespace kinespace::fuzz {
 
+std::vector<std::string> codecs() {
+  std::vector<std::string> out;
+  for (const Codec* codec : all_codecs()) out.emplace_back(codec->name());
+  return out;
+}
+
 const Bytes& good_stream() {
   static const Bytes stream = [] {
     std::vector<Clip> clips;
     const auto motions = sample_library({.takes = 1});
     for (const auto& motion : std::span(motions).first(3)) clips.push_back(slice(motion.clip, 0, 40));
-    return encode(KINESPACE_FUZZ_CODEC, clips);
+    return encode(codec(), clips);
   }();
   return stream;
 }

@@ -24,12 +24,14 @@ namespace kinespace::test {
   return blocks.empty() ? Bytes() : Bytes(blocks.front().begin(), blocks.front().end());
 }
 
-// `name`: of the part that becomes `content`; empty: a copy.
-[[nodiscard]] inline Bytes forged(const Bytes& stream, std::string_view name, const Bytes& content) {
+// `name`: of the part that becomes `content`; empty: a copy. `options`: beside, or instead of, those that it has.
+[[nodiscard]] inline Bytes forged(const Bytes& stream, std::string_view name, const Bytes& content,
+                                  const BitstreamOptions& options = {}) {
   const Bitstream parsed = Bitstream::parse(stream, "s");
   BitstreamWriter out(parsed.kind());
   out.set_error(parsed.error());
   for (const auto& [key, value] : parsed.options()) out.set_option(key, value);
+  for (const auto& [key, value] : options) out.set_option(key, value);
   for (const std::string& section : parsed.section_names()) {
     if (!parsed.is_progressive(section)) {
       const auto bytes = parsed.section(section);
@@ -42,6 +44,10 @@ namespace kinespace::test {
     out.add_progressive_section(section, blocks);
   }
   return out.finish();
+}
+
+[[nodiscard]] inline Bytes with_option(const Bytes& stream, const std::string& key, const std::string& value) {
+  return forged(stream, {}, {}, {{key, value}});
 }
 
 }  // namespace kinespace::test

@@ -197,7 +197,7 @@ class PoseSpaceReader final : public ClipReader {
 
 }  // namespace
 
-std::unique_ptr<StreamReader> PoseSpaceCodec::open(Bitstream stream, const PoseSpaceBasis* basis) const {
+std::unique_ptr<StreamReader> PoseSpaceCodec::open_with(const PoseSpaceBasis* basis, Bitstream stream) const {
   stream.require_kind(stream_kind(name()));
   const std::string* wanted = stream.find_option("basis");
   if (wanted == nullptr) return std::make_unique<PoseSpaceReader>(std::move(stream), nullptr);
@@ -217,7 +217,7 @@ ClipErrorSums decoded_error(std::span<const std::byte> stream, std::span<const C
 }
 
 std::unique_ptr<StreamReader> PoseSpaceCodec::open(Bitstream stream) const {
-  return open(std::move(stream), nullptr);
+  return open_with(nullptr, std::move(stream));
 }
 
 }  // namespace kinespace
