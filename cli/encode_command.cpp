@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -78,27 +77,23 @@ std::vector<Clip> read_clips(const std::vector<fs::path>& files, const Progress&
   return out;
 }
 
-std::map<std::string, double, std::less<>> parse_settings(const std::vector<std::string>& settings) {
-  std::map<std::string, double, std::less<>> out;
-  for (const std::string& setting : settings) {
-    const std::size_t equals = setting.find('=');
-    const char* const last = setting.data() + setting.size();
-    double value = 0;
-    const auto read = equals == std::string::npos ? std::from_chars_result{last, std::errc::invalid_argument}
-                                                  : std::from_chars(setting.data() + equals + 1, last, value);
-    if (read.ec != std::errc() || read.ptr != last) {
-      throw Error(ErrorKind::usage, {.found = "--set " + setting, .expected = "NAME=NUMBER, as in --set step=2"});
-    }
-    out[setting.substr(0, equals)] = value;
-  }
-  return out;
-}
-
 // The settings with --profile and --variance among them.
 std::map<std::string, double, std::less<>> all_settings(const EncodeOptions& options) {
-  auto out = parse_settings(options.settings);
-  if (!options.profile.empty()) out["profile"] = options.profile == "paper" ? 1 : 0;
-  if (options.variance) out["variance"] = *options.variance;
+  const Codec& codec = find_codec(options.codec);
+  std::map<std::string, double, std::less<>> out;
+  const auto set = [&](const std::string& name, std::string_view value) {
+    out[name] = find_setting(codec, name).parse(value);
+  };
+  for (const std::string& setting : options.settings) {
+    const std::size_t equals = setting.find('=');
+    if (equals == std::string::npos) {
+      throw Error(ErrorKind::usage,
+                  {.found = "--set " + setting, .expected = "NAME=VALUE, as in --set step=2 or --set repeats=off"});
+    }
+    set(setting.substr(0, equals), std::string_view(setting).substr(equals + 1));
+  }
+  if (!options.profile.empty()) set("profile", options.profile);
+  if (options.variance) set("variance", fmt::format("{}", *options.variance));
   return out;
 }
 
@@ -144,8 +139,8 @@ void run_encode(const EncodeOptions& options, Session& session) {
 void print_settings() {
   for (const Codec* codec : all_codecs()) {
     for (const CodecSetting& setting : codec->settings()) {
-      print("{:<13} {:<21} {} ({}; {} to {})\n", codec->name(), setting.name, setting.meaning, setting.initial,
-            setting.least, setting.most);
+      print("{:<13} {:<21} {} ({}; {})\n", codec->name(), setting.name, setting.meaning, setting.text(setting.initial),
+            setting.range());
     }
   }
 }
@@ -178,7 +173,7 @@ void add_encode(CLI::App& app, Session& session) {
       ->check(CLI::IsMember({"default", "paper"}));
   command->add_option("--variance", options->variance,
                       "Percent of variance that the axes keep, without a target: rma --profile paper, clip-pca");
-  command->add_option("--set", options->settings, "A setting of the codec, NAME=NUMBER; --settings lists them")
+  command->add_option("--set", options->settings, "A setting of the codec, NAME=VALUE; --settings lists them")
       ->allow_extra_args(false);
   command
       ->add_flag_callback(

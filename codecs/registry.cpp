@@ -19,20 +19,9 @@ namespace {
 
 void check_settings(const Codec& codec, const CodecOptions& options) {
   for (const auto& [name, value] : options.settings) {
-    const CodecSetting* found = nullptr;
-    std::string names;
-    for (const CodecSetting& setting : codec.settings()) {
-      if (setting.name == name) found = &setting;
-      names += fmt::format("{}{}", names.empty() ? "" : ", ", setting.name);
-    }
-    if (found == nullptr) {
-      throw Error(ErrorKind::usage, {.found = fmt::format("setting {} of codec {}", name, codec.name()),
-                                     .expected = names.empty() ? "no settings" : names});
-    }
-    if (!(value >= found->least && value <= found->most)) {
-      throw Error(ErrorKind::usage, {.found = fmt::format("{} = {}", name, value),
-                                     .expected = fmt::format("{} to {}", found->least, found->most)});
-    }
+    const CodecSetting& setting = find_setting(codec, name);
+    if (setting.allows(value)) continue;
+    throw Error(ErrorKind::usage, {.found = fmt::format("{} = {}", name, value), .expected = setting.range()});
   }
 }
 
@@ -68,6 +57,16 @@ const Codec& find_codec(std::string_view name) {
     names += fmt::format("{}{}", names.empty() ? "" : ", ", codec->name());
   }
   throw Error(ErrorKind::usage, {.found = fmt::format("codec {}", name), .expected = names});
+}
+
+const CodecSetting& find_setting(const Codec& codec, std::string_view name) {
+  std::string names;
+  for (const CodecSetting& setting : codec.settings()) {
+    if (setting.name == name) return setting;
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", setting.name);
+  }
+  throw Error(ErrorKind::usage, {.found = fmt::format("setting {} of codec {}", name, codec.name()),
+                                 .expected = names.empty() ? "no settings" : names});
 }
 
 Bytes encode(std::string_view codec, std::span<const Clip> clips, const CodecOptions& options) {

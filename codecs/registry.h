@@ -1,4 +1,4 @@
-// Codecs by their name. A new codec is a file pair with a class of Codec, and one line in registry.cpp.
+// Codecs by their name. A new codec is a folder with a class of Codec, and one row in registry.cpp.
 #pragma once
 
 #include <memory>
@@ -13,6 +13,7 @@ namespace kinespace {
 [[nodiscard]] std::span<const Codec* const> all_codecs();
 // Throws Error{usage} naming those there are.
 [[nodiscard]] const Codec& find_codec(std::string_view name);
+[[nodiscard]] const CodecSetting& find_setting(const Codec& codec, std::string_view name);
 
 // Checks clips and options, then encodes.
 [[nodiscard]] Bytes encode(std::string_view codec, std::span<const Clip> clips, const CodecOptions& options = {});

@@ -17,8 +17,8 @@
 namespace kinespace {
 namespace {
 
-constexpr std::array zstd_settings{CodecSetting{"level", 19, 1, highest_zstd_level, "zstandard's level"}};
-constexpr std::array xz_settings{CodecSetting{"level", 6, 0, highest_xz_level, "xz's preset"}};
+constexpr std::array zstd_settings{CodecSetting::whole("level", 19, 1, highest_zstd_level, "zstandard's level")};
+constexpr std::array xz_settings{CodecSetting::whole("level", 6, 0, highest_xz_level, "xz's preset")};
 constexpr std::size_t planes = sizeof(float);
 
 // Three turns for every joint, in its parent's frame.

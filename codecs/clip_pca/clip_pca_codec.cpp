@@ -24,7 +24,7 @@ namespace {
 
 constexpr std::array clip_pca_settings{
     CodecSetting{"variance", 95, 30, 100, "percent of variance that the axes keep, where no target is given"},
-    CodecSetting{"contacts", 1, 0, 1, "1: joints on the ground are kept apart and put there by inverse kinematics"},
+    CodecSetting::flag("contacts", true, "joints on the ground are kept apart and put there by inverse kinematics"),
 };
 
 class ClipPcaEncoder {
@@ -202,7 +202,7 @@ Bytes ClipPcaCodec::encode(std::span<const Clip> clips, const CodecOptions& opti
   if (options.target.mean_error_cm) expected = *options.target.mean_error_cm;
   if (options.target.max_error_cm) expected = *options.target.max_error_cm / 8;
   const double variance = setting(options, "variance");
-  const ClipPcaEncoder encoder(clips, variance, std::min(2.0, 0.35 * expected), setting(options, "contacts") >= 0.5,
+  const ClipPcaEncoder encoder(clips, variance, std::min(2.0, 0.35 * expected), flag(options, "contacts"),
                                options.progress);
   if (!options.target.any()) return encoder.attempt(variance / 100).stream;
   return search_target(options.target, {.start = expected},

@@ -25,7 +25,7 @@ constexpr std::array codec_settings{
     CodecSetting{"shell_ratio", 1.6, 1.05, 100, "largest shell error, as a multiple of the mean joint error"},
     CodecSetting{"rate_weight", 0.18, 0, 1, "squared steps that a bit is worth when values are chosen"},
     CodecSetting{"window_s", 0, 0, 60, "length of the windows in seconds; 0: cut where it saves bits"},
-    CodecSetting{"group_frames", 4096, 1, 1 << 20, "frames that are decoded together at least"},
+    CodecSetting::whole("group_frames", 4096, 1, 1 << 20, "frames that are decoded together at least"),
 };
 
 }  // namespace

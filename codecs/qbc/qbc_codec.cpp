@@ -25,9 +25,9 @@ namespace {
 constexpr std::array qbc_settings{
     CodecSetting{"max_squared_distance", 18, 1e-8, 1e6,
                  "limit d^2 of a joint's squared distance in every frame, in squared degrees (root units)"},
-    CodecSetting{"interval", 160, 1, longest_segment, "frames between the breaks that all joints have"},
+    CodecSetting::whole("interval", 160, 1, longest_segment, "frames between the breaks that all joints have"),
     CodecSetting{"root_unit", 5.6444F, 1e-3, 1e3, "cm of the root's position that count as a degree"},
-    CodecSetting{"merge", 1, 0, 1, "1: breaks chosen by error and bits; 0: the paper's rule alone"},
+    CodecSetting::flag("merge", true, "breaks chosen by error and bits; off: the paper's rule alone"),
     CodecSetting{"rate_weight", 0.05, 0, 1, "share of the limit that a bit is worth when breaks and points are chosen"},
 };
 
@@ -166,7 +166,7 @@ Bytes QbcCodec::encode(std::span<const Clip> clips, const CodecOptions& options)
   const Plan plan{.limit = setting(options, "max_squared_distance"),
                   .interval = static_cast<int>(setting(options, "interval")),
                   .root_unit = setting(options, "root_unit"),
-                  .paper = setting(options, "merge") < 0.5,
+                  .paper = !flag(options, "merge"),
                   .rate_weight = setting(options, "rate_weight")};
   if (options.target.any()) return meet(options.target, clips, plan, options.progress);
   const double tolerance = std::clamp(0.02 * std::sqrt(plan.limit), 1e-5, 0.01);

@@ -14,14 +14,16 @@ namespace kinespace {
 namespace {
 
 constexpr std::array codec_settings{
-    CodecSetting{"profile", 0, 0, 1, "0: default; 1: the paper's rules"},
+    CodecSetting::choice("profile", "default", "paper", "the paper's rules, or what goes beyond them"),
     CodecSetting{"variance", 95, 30, 100, "paper's profile without a target: percent of variance that the axes keep"},
     CodecSetting{"step", 15, 1e-6, 1e6,
                  "default profile without a target: quantiser step, in cm times the root of the joints"},
-    CodecSetting{"repeats", 1, 0, 1, "0: every clip is unique; 1: repeated clips refer to primary ones"},
-    CodecSetting{"contacts", 1, 0, 1, "1: joints on the ground are kept apart and put there by inverse kinematics"},
-    CodecSetting{"primary_bits", 0, 0, 24, "paper's profile: bits of primary clips' control points; 0: adaptive"},
-    CodecSetting{"repeated_bits", 0, 0, 24, "paper's profile: bits of repeated clips' control points; 0: adaptive"},
+    CodecSetting::flag("repeats", true, "repeated clips refer to primary ones; off: every clip is unique"),
+    CodecSetting::flag("contacts", true, "joints on the ground are kept apart and put there by inverse kinematics"),
+    CodecSetting::whole("primary_bits", 0, 0, 24,
+                        "paper's profile: bits of primary clips' control points; 0: adaptive"),
+    CodecSetting::whole("repeated_bits", 0, 0, 24,
+                        "paper's profile: bits of repeated clips' control points; 0: adaptive"),
 };
 
 }  // namespace
@@ -31,9 +33,9 @@ std::span<const CodecSetting> RmaCodec::settings() const {
 }
 
 Bytes RmaCodec::encode(std::span<const Clip> clips, const CodecOptions& options) const {
-  const bool repeats = setting(options, "repeats") >= 0.5;
-  const bool contacts = setting(options, "contacts") >= 0.5;
-  if (setting(options, "profile") < 0.5) {
+  const bool repeats = flag(options, "repeats");
+  const bool contacts = flag(options, "contacts");
+  if (!flag(options, "profile")) {
     return encode_repeat_profile(clips, options.target,
                                  {.step = setting(options, "step"), .repeats = repeats, .contacts = contacts},
                                  options.progress);

@@ -1,5 +1,6 @@
 #include "kinespace/codecs/stream/codec.h"
 
+#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -44,6 +45,31 @@ void CodecTarget::validate() const {
   }
 }
 
+bool CodecSetting::allows(double value) const {
+  return value >= least && value <= most && (kind == Kind::number || value == std::floor(value));
+}
+
+std::string CodecSetting::text(double value) const {
+  const bool in_words = kind == Kind::flag || kind == Kind::choice;
+  return in_words && allows(value) ? std::string(words[static_cast<std::size_t>(value)]) : fmt::format("{}", value);
+}
+
+std::string CodecSetting::range() const {
+  if (kind == Kind::flag || kind == Kind::choice) return fmt::format("{} or {}", words[0], words[1]);
+  return fmt::format("{}{} to {}", kind == Kind::whole ? "a whole number from " : "", least, most);
+}
+
+double CodecSetting::parse(std::string_view text) const {
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (!words[i].empty() && words[i] == text) return static_cast<double>(i);
+  }
+  double value = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool number = read.ec == std::errc() && read.ptr == text.data() + text.size();
+  if (number && allows(value)) return value;
+  throw Error(ErrorKind::usage, {.found = fmt::format("{} = {}", name, text), .expected = range()});
+}
+
 Clip StreamReader::decode_joint(std::size_t /*clip*/, int /*joint*/, int /*first*/, int /*count*/) const {
   throw Error(ErrorKind::usage, {.file = stream().source(),
                                  .found = "a stream whose joints lie together",
@@ -72,6 +98,10 @@ double Codec::setting(const CodecOptions& options, std::string_view name) const 
     if (setting.name == name) return setting.initial;
   }
   throw Error(ErrorKind::usage, {.found = fmt::format("no setting {}", name), .expected = "one of the codec's"});
+}
+
+bool Codec::flag(const CodecOptions& options, std::string_view name) const {
+  return setting(options, name) != 0;
 }
 
 }  // namespace kinespace

@@ -10,6 +10,7 @@
 //   const Clip clip = reader->decode(0);
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -43,13 +44,38 @@ struct CodecTarget {
 [[noreturn]] void cannot_meet(const std::string& found, std::string expected);
 [[noreturn]] void cannot_meet(const CodecTarget& target);
 
-// A number that a codec can be set by.
+// What a codec can be set by: a number, a whole number, on or off, or one of a few words.
 struct CodecSetting {
+  enum class Kind : std::uint8_t { number, whole, flag, choice };
+
   std::string_view name;
   double initial = 0;
   double least = 0;
   double most = 0;
   std::string_view meaning;  // with its unit
+  Kind kind = Kind::number;
+  std::array<std::string_view, 3> words = {};  // of a choice, by its number
+
+  static constexpr CodecSetting whole(std::string_view name, int initial, int least, int most,
+                                      std::string_view meaning) {
+    return {name,       static_cast<double>(initial), static_cast<double>(least), static_cast<double>(most), meaning,
+            Kind::whole};
+  }
+  static constexpr CodecSetting flag(std::string_view name, bool initial, std::string_view meaning) {
+    return {name, initial ? 1.0 : 0.0, 0, 1, meaning, Kind::flag, {"off", "on"}};
+  }
+  // Of two words, the first when nothing is set.
+  static constexpr CodecSetting choice(std::string_view name, std::string_view first, std::string_view second,
+                                       std::string_view meaning) {
+    return {name, 0, 0, 1, meaning, Kind::choice, {first, second}};
+  }
+
+  [[nodiscard]] bool allows(double value) const;
+  // A value as a user writes it, and what may be written: "on", "0.5 to 100", "default or paper".
+  [[nodiscard]] std::string text(double value) const;
+  [[nodiscard]] std::string range() const;
+  // The value that is written so; also numbers of words. Throws Error{usage} naming setting, text and range.
+  [[nodiscard]] double parse(std::string_view text) const;
 };
 
 // The kind of a codec's streams; of none, what all of them begin with.
@@ -137,8 +163,9 @@ class Codec {
   }
 
  protected:
-  // The value of one of settings().
+  // The value of one of settings(); of a flag, whether it is on.
   [[nodiscard]] double setting(const CodecOptions& options, std::string_view name) const;
+  [[nodiscard]] bool flag(const CodecOptions& options, std::string_view name) const;
 };
 
 }  // namespace kinespace

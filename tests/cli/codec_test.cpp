@@ -125,7 +125,7 @@ TEST_F(CodecCommands, wrong_use_is_told_in_one_line) {
             std::string::npos);
   EXPECT_NE(fails({"encode", clip("walk_normal_001"), "-o", at("y.ksm"), "--set", "stop=2"}, 2).find("stop"),
             std::string::npos);
-  EXPECT_NE(fails({"encode", clip("walk_normal_001"), "-o", at("y.ksm"), "--set", "step"}, 2).find("NAME=NUMBER"),
+  EXPECT_NE(fails({"encode", clip("walk_normal_001"), "-o", at("y.ksm"), "--set", "step"}, 2).find("NAME=VALUE"),
             std::string::npos);
   fails({"encode", clip("walk_normal_001"), "-o", at("y.ksm"), "--error", "1", "--bytes", "500"}, 2);
   fails({"encode", clip("walk_normal_001"), "-o", at("y.ksm"), "--codec", "zip"}, 2);

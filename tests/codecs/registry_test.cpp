@@ -58,6 +58,26 @@ TEST(Registry, a_payload_of_a_later_version_is_refused_by_its_number) {
   }
 }
 
+TEST(Registry, settings_are_written_in_words_and_numbers_and_come_back) {
+  for (const Codec* codec : all_codecs()) {
+    for (const CodecSetting& setting : codec->settings()) {
+      for (const double value : {setting.initial, setting.least, setting.most}) {
+        EXPECT_TRUE(setting.allows(value));
+        EXPECT_EQ(setting.parse(setting.text(value)), value) << codec->name() << " " << setting.name;
+      }
+      for (const char* text : {"", "x", "1e99", "nan", "1 ", "-"}) {
+        EXPECT_THROW(static_cast<void>(setting.parse(text)), Error) << setting.name << " = " << text;
+      }
+    }
+  }
+  const CodecSetting& profile = find_setting(find_codec("rma"), "profile");
+  EXPECT_EQ(profile.parse("paper"), 1);
+  EXPECT_EQ(profile.parse("1"), 1);
+  EXPECT_EQ(profile.range(), "default or paper");
+  EXPECT_FALSE(profile.allows(0.5));
+  EXPECT_EQ(find_setting(find_codec("qbc"), "merge").parse("off"), 0);
+}
+
 TEST(Registry, options_out_of_range_are_named) {
   const auto refused = [](const CodecOptions& options) {
     try {

@@ -18,7 +18,7 @@ namespace kinespace {
 namespace {
 
 constexpr std::array pca_settings{
-    CodecSetting{"components", 13, 0, 4096, "eigenvectors that are kept of each clip"},
+    CodecSetting::whole("components", 13, 0, 4096, "eigenvectors that are kept of each clip"),
     CodecSetting{"step", 0, 0, 1e3, "quantiser step in degrees (cm) times root channels; 0: what goes with the error"},
     CodecSetting{"rate_weight", 0, 0, 1, "squared steps that a bit is worth when values are chosen"},
 };
