@@ -7,7 +7,7 @@
 #include "kinespace/motion/amc.h"
 #include "kinespace/motion/bvh.h"
 #include "kinespace/motion/kinematics.h"
-#include "tests/motion/allocation_meter.h"
+#include "tests/support/allocation_meter.h"
 #include "tests/motion/sample_clips.h"
 
 namespace kinespace::test {
@@ -154,7 +154,7 @@ TEST_P(HostileInput, random_edits_make_an_error_or_a_valid_clip_in_bounded_memor
     for (auto edits = 1 + random() % 4; edits > 0; --edits) mutate(damaged, random);
     const AllocationMeter meter;
     if (outcome_of(parse, damaged) == Outcome::clip) ++clips;
-    ASSERT_LT(meter.peak_bytes(), 1u << 20) << damaged;
+    ASSERT_LT(meter.peak(), 1u << 20) << damaged;
     if (HasFailure()) return;
   }
   EXPECT_GT(clips, 30) << "edits that leave nothing to parse test nothing";

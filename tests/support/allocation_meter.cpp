@@ -16,6 +16,8 @@ namespace {
 
 std::atomic<std::size_t> held{0};
 std::atomic<std::size_t> most{0};
+std::atomic<std::size_t> all{0};
+std::atomic<std::size_t> handed_out{0};
 
 }  // namespace
 
@@ -30,7 +32,10 @@ void __libc_free(void* block);
 
 static void* counted(void* block) {
   if (block == nullptr) return block;
-  const std::size_t now = held.fetch_add(malloc_usable_size(block)) + malloc_usable_size(block);
+  const std::size_t size = malloc_usable_size(block);
+  all += size;
+  ++handed_out;
+  const std::size_t now = held.fetch_add(size) + size;
   std::size_t before = most.load();
   while (before < now && !most.compare_exchange_weak(before, now)) {
   }
@@ -73,7 +78,7 @@ void free(void* block) {
 
 namespace kinespace::test {
 
-AllocationMeter::AllocationMeter() : start_(held.load()) {
+AllocationMeter::AllocationMeter() : start_(held.load()), start_bytes_(all.load()), start_pieces_(handed_out.load()) {
   most.store(start_);
 }
 
@@ -84,6 +89,14 @@ bool AllocationMeter::counts() {
 std::size_t AllocationMeter::peak() const {
   const std::size_t now = most.load();
   return now > start_ ? now - start_ : 0;
+}
+
+std::size_t AllocationMeter::all_bytes() const {
+  return all.load() - start_bytes_;
+}
+
+std::size_t AllocationMeter::pieces() const {
+  return handed_out.load() - start_pieces_;
 }
 
 }  // namespace kinespace::test
