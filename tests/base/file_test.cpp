@@ -17,22 +17,14 @@
 
 #include "kinespace/base/error.h"
 #include "tests/support/data.h"
+#include "tests/support/error_of.h"
 
 namespace kinespace {
 namespace {
 
+using test::error_of;
 using test::TemporaryFolder;
 using testing::HasSubstr;
-
-Error error_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error;
-  }
-  ADD_FAILURE() << "no error";
-  return {ErrorKind::usage, {}};
-}
 
 std::vector<std::string> files_in(const std::filesystem::path& folder) {
   std::vector<std::string> names;

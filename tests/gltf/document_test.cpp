@@ -104,6 +104,19 @@ TEST(GltfDocument, members_of_another_type_are_named) {
   EXPECT_THAT(changed("/buffers/0/byteLength", 1e18), HasSubstr("buffers[0].byteLength"));
 }
 
+// A triangle whose scale goes from time 0 to time n.
+Json triangle_that_grows(int n) {
+  const std::string times = bytes_of<float>({0, static_cast<float>(n)});
+  Json out = triangle_at(data_uri(triangle_bytes() + times));
+  out["buffers"][0]["byteLength"] = 52;
+  out["bufferViews"].push_back(view_of(44, 8));
+  out["accessors"].push_back(accessor_of(2, 5126, 2, "SCALAR"));
+  out["accessors"].push_back(accessor_of(0, 5126, 2, "VEC3"));
+  out["animations"] = {{{"samplers", {{{"input", 2}, {"output", 3}}}},
+                        {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}}}}};
+  return out;
+}
+
 // Small files that stand for much, each by another way; `n` says how much.
 const std::map<std::string, std::function<Json(int n)>>& greedy() {
   static const std::map<std::string, std::function<Json(int)>> all = {
@@ -153,28 +166,10 @@ const std::map<std::string, std::function<Json(int n)>>& greedy() {
          out["animations"][0]["samplers"] = {{{"input", 2}, {"output", 0}}};
          return out;
        }},
-      {"frames",
-       [](int n) {
-         const std::string times = bytes_of<float>({0, static_cast<float>(n)});
-         Json out = triangle_at(data_uri(triangle_bytes() + times));
-         out["buffers"][0]["byteLength"] = 52;
-         out["bufferViews"].push_back(view_of(44, 8));
-         out["accessors"].push_back(accessor_of(2, 5126, 2, "SCALAR"));
-         out["accessors"].push_back(accessor_of(0, 5126, 2, "VEC3"));
-         out["animations"] = {{{"samplers", {{{"input", 2}, {"output", 3}}}},
-                               {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}}}}};
-         return out;
-       }},
+      {"frames", triangle_that_grows},
       {"frames of many nodes",
        [](int n) {
-         const std::string times = bytes_of<float>({0, static_cast<float>(n)});
-         Json out = triangle_at(data_uri(triangle_bytes() + times));
-         out["buffers"][0]["byteLength"] = 52;
-         out["bufferViews"].push_back(view_of(44, 8));
-         out["accessors"].push_back(accessor_of(2, 5126, 2, "SCALAR"));
-         out["accessors"].push_back(accessor_of(0, 5126, 2, "VEC3"));
-         out["animations"] = {{{"samplers", {{{"input", 2}, {"output", 3}}}},
-                               {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "scale"}}}}}}}};
+         Json out = triangle_that_grows(n);
          for (int i = 0; i < 100; ++i) out["nodes"].push_back(Json::object());
          return out;
        }},

@@ -7,8 +7,8 @@
 #include "kinespace/motion/amc.h"
 #include "kinespace/motion/bvh.h"
 #include "kinespace/motion/kinematics.h"
-#include "tests/support/allocation_meter.h"
 #include "tests/motion/sample_clips.h"
+#include "tests/support/allocation_meter.h"
 
 namespace kinespace::test {
 namespace {

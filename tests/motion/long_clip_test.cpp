@@ -14,9 +14,9 @@
 #include "kinespace/motion/amc.h"
 #include "kinespace/motion/bvh.h"
 #include "kinespace/motion/detail/bvh_hierarchy.h"
-#include "tests/support/allocation_meter.h"
 #include "tests/motion/sample_clips.h"
 #include "tests/motion/watched_text.h"
+#include "tests/support/allocation_meter.h"
 #include "tests/support/data.h"
 
 namespace kinespace::test {

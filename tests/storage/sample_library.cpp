@@ -34,16 +34,6 @@ bool same_row(const ClipRow& a, const ClipRow& b) {
 
 }  // namespace
 
-Error error_of(const std::function<void()>& act) {
-  try {
-    act();
-  } catch (const Error& error) {
-    return error;
-  }
-  ADD_FAILURE() << "no error";
-  return {ErrorKind::usage, {}};
-}
-
 ClipRow sample_row(int number, std::int64_t space, std::int64_t skeleton) {
   const std::string digits = std::to_string(number);
   ClipRow row{.space_id = space,

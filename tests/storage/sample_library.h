@@ -10,6 +10,7 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/storage/library.h"
+#include "tests/support/error_of.h"
 
 namespace kinespace::test {
 
@@ -30,9 +31,6 @@ void read_everything(const Library& library);
 // Opens the file and reads everything; an Error of the machine's or of another type than Error fails the test.
 // Returns whether nothing was thrown.
 bool survives(const std::filesystem::path& path);
-
-// The Error that `act` throws; without one the test fails.
-[[nodiscard]] Error error_of(const std::function<void()>& act);
 
 // Writes a file anew without flushing it to the disk, as a test that writes thousands must.
 void write_unflushed(const std::filesystem::path& path, std::span<const std::byte> bytes);
