@@ -20,9 +20,7 @@
 namespace kinespace {
 namespace {
 
-constexpr double usual_kg = 0.5;
 constexpr int usual_functions = 400;
-constexpr double first_step = 6;  // of coefficients, over the root mean square error: where the search begins
 
 class Search {
  public:
@@ -50,7 +48,7 @@ class Search {
 
   // The key-frame's step follows from the error, which is found in turns with it.
   [[nodiscard]] Bytes for_bytes(std::int64_t bytes) {
-    double kg = usual_kg;
+    double kg = MeshCodecOptions::usual_kg;
     Analysed best;
     HarmonicsAnalysis::Trial best_trial;
     std::int64_t least = std::numeric_limits<std::int64_t>::max();
@@ -201,7 +199,8 @@ class Search {
 
 Bytes encode_harmonics(const MeshSequence& mesh, const MeshCodecOptions& options) {
   Search search(mesh, options);
-  return options.bytes ? search.for_bytes(*options.bytes) : search.for_error(options.kg.value_or(usual_kg));
+  return options.bytes ? search.for_bytes(*options.bytes)
+                       : search.for_error(options.kg.value_or(MeshCodecOptions::usual_kg));
 }
 
 }  // namespace kinespace

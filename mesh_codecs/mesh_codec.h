@@ -39,7 +39,9 @@ enum class MeshProfile : std::uint8_t {
 };
 
 struct MeshCodecOptions {
-  // What the stream must keep to; at most one of the two. Neither: `kg` of 0.5; where bases or clusters of the paper's
+  static constexpr double usual_kg = 0.5;  // percent
+
+  // What the stream must keep to; at most one of the two. Neither: `usual_kg`; where bases or clusters of the paper's
   // profile are given, what these allow.
   std::optional<double> kg;           // percent, 0.001 to 50
   std::optional<std::int64_t> bytes;  // of the whole stream, > 0

@@ -86,7 +86,7 @@ std::vector<double> headings(const ClipCurves& root, const Eigen::Quaterniond& t
   return out;
 }
 
-CoarsePlacement place(const ClipCurves& curves) {
+CoarsePlacement placement_of(const ClipCurves& curves) {
   CoarsePlacement out;
   for (std::size_t k = 0; k < 3; ++k) {
     const double start = curves.placement.start_cm[static_cast<Eigen::Index>(k)];
@@ -106,7 +106,7 @@ CoarsePlacement place(const ClipCurves& curves) {
 // The travel root in the clip's own frame.
 struct RootPath {
   explicit RootPath(const ClipCurves& root)
-      : placement(place(root)),
+      : placement(placement_of(root)),
         from_curves(about_vertical(root.placement.heading_rad)),
         turn(placement.turn().conjugate() * from_curves),
         heading(headings(root, turn)) {}

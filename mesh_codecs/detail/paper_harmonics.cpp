@@ -22,9 +22,7 @@
 namespace kinespace {
 namespace {
 
-constexpr double usual_kg = 0.5;
 constexpr double key_steps = 0.5;  // step of the key-frames over the root mean square error a coordinate
-constexpr double first_step = 6;   // the same of coefficients, where the search begins
 
 struct Choice {
   int functions = 0;
@@ -197,9 +195,9 @@ std::vector<Choice> choices(const MeshSequence& mesh, const MeshCodecOptions& op
 }
 
 // Looks for functions, clusters and step.
-class Search {
+class PaperSearch {
  public:
-  Search(const MeshSequence& mesh, const MeshCodecOptions& options)
+  PaperSearch(const MeshSequence& mesh, const MeshCodecOptions& options)
       : mesh_(mesh),
         options_(options),
         distances_(frame_distances(mesh)),
@@ -239,14 +237,15 @@ class Search {
 
   // A twentieth more than exact coefficients would give, where that is not next to nothing.
   [[nodiscard]] Bytes for_bases() const {
-    const Encoder encoder = encoder_of(choices_.front(), usual_kg);
-    return encoder.encode(step_for(encoder, std::max(1.05 * floor_of(encoder), 0.1 * usual_kg))).stream;
+    const Encoder encoder = encoder_of(choices_.front(), MeshCodecOptions::usual_kg);
+    return encoder.encode(step_for(encoder, std::max(1.05 * floor_of(encoder), 0.1 * MeshCodecOptions::usual_kg)))
+        .stream;
   }
 
   // Key-frames as fine as leaves room for the rest.
   [[nodiscard]] Bytes for_bytes(std::int64_t bytes) const {
     const Choice& choice = options_.bases > 0 || choices_.size() == 1 ? choices_.front() : choices_[1];
-    for (double kg = usual_kg; kg < 50; kg *= 2) {
+    for (double kg = MeshCodecOptions::usual_kg; kg < 50; kg *= 2) {
       const Encoder encoder = encoder_of(choice, kg);
       const auto size = [&](double fineness) { return encoder.code(1 / fineness).bytes; };
       auto room = static_cast<double>(bytes);
@@ -288,11 +287,11 @@ class Search {
 }  // namespace
 
 Bytes encode_paper_harmonics(const MeshSequence& mesh, const MeshCodecOptions& options) {
-  const Search search(mesh, options);
+  const PaperSearch search(mesh, options);
   if (options.bytes) return search.for_bytes(*options.bytes);
   // By bases and clusters, when these are all that is asked for.
   if (!options.kg && (options.bases > 0 || options.clusters > 0)) return search.for_bases();
-  return search.for_error(options.kg.value_or(usual_kg));
+  return search.for_error(options.kg.value_or(MeshCodecOptions::usual_kg));
 }
 
 }  // namespace kinespace

@@ -22,8 +22,8 @@ constexpr std::array pca_settings{
     CodecSetting{"step", 0, 0, 1e3, "quantiser step in degrees (cm) times root channels; 0: what goes with the error"},
     CodecSetting{"rate_weight", 0, 0, 1, "squared steps that a bit is worth when values are chosen"},
 };
-constexpr double noise_share = 0.5;      // of what was left out
-constexpr double paper_rounding = 0.01;  // two decimals
+constexpr double pca_noise_share = 0.5;  // of what was left out
+constexpr double pca_rounding = 0.01;    // two decimals
 constexpr int least_exponent = 3;        // eigenvectors: an eighth
 constexpr int most_exponent = 20;
 
@@ -80,11 +80,11 @@ class PcaAnalysis final : public PieceAnalysis {
     const double samples = static_cast<double>(piece_.channels) * piece_.frames;
     const double lost = quality.tolerance > 0 ? quality.tolerance * quality.tolerance * samples
                                               : energy_.tail(piece_.channels - q).sum();
-    const double least = quality.tolerance > 0 ? 0 : paper_rounding;
+    const double least = quality.tolerance > 0 ? 0 : pca_rounding;
     const double count = static_cast<double>(q) * piece_.frames;
     PieceCoefficients out{.shape = pca_shape(q, piece_.frames)};
     out.step_index =
-        step_index_below(quality.step > 0 ? quality.step : step_for_error(lost, noise_share, count, least));
+        step_index_below(quality.step > 0 ? quality.step : step_for_error(lost, pca_noise_share, count, least));
     const double step = grid_step(out.step_index);
 
     PcaSide side{.components = q};
