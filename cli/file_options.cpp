@@ -62,7 +62,9 @@ void require_place_for(const fs::path& output, std::optional<FileKind> kind) {
 
 std::optional<FileKind> kind_by_ending(const fs::path& path) {
   const FileFormat* format = find_format(path);
-  if (format == nullptr || format->kind == FileKind::other) return std::nullopt;
+  const bool in_folders_only =
+      format != nullptr && format->holds_meshes && format->write == nullptr && format->companion.empty();
+  if (format == nullptr || format->kind == FileKind::other || in_folders_only) return std::nullopt;
   return format->kind;
 }
 

@@ -310,9 +310,7 @@ void add_mesh_encode(CLI::App& mesh, Session& session) {
       ->required();
   command->add_option("-o,--output", options->output, "The stream to write")->required();
   std::vector<std::string> names(mesh_codecs().begin(), mesh_codecs().end());
-  command->add_option("--codec", options->codec, "mesh-harmonics, mesh-pca or mesh-draco")
-      ->check(CLI::IsMember(names))
-      ->capture_default_str();
+  command->add_option("--codec", options->codec, listed(names))->check(CLI::IsMember(names))->capture_default_str();
   command->add_option("--profile", options->profile, "Of mesh-harmonics: standard, or paper (as chen2019 has it)")
       ->check(CLI::IsMember({"standard", "paper"}))
       ->capture_default_str();

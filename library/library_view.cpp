@@ -20,7 +20,9 @@ namespace kinespace {
 namespace {
 
 bool looks_like_a_file(const std::string& name) {
-  return name.find('/') != std::string::npos || find_format(name) != nullptr;
+  const FileFormat* format = find_format(name);
+  const bool of_motion = format != nullptr && (format->read != nullptr || !format->instead.empty());
+  return name.find('/') != std::string::npos || of_motion;
 }
 
 double largest_distance(const JointPositions& a, const JointPositions& b) {

@@ -51,7 +51,7 @@ std::pair<std::string, std::string> in_its_place(ErrorKind kind, const std::file
   const bool input = kind == ErrorKind::bad_input;
   if (input && !std::filesystem::exists(path, ignored)) return {"no such file", "check the path"};
   const FileFormat* format = find_format(path);
-  const bool of_other_use = format != nullptr && !format->instead.empty() && (input || format->write == nullptr);
+  const bool of_other_use = format != nullptr && !format->instead.empty() && (input || format->kind == FileKind::asf);
   if (of_other_use) return {std::string(format->instead), std::string(format->remedy)};
   const std::string ending = path.extension().string();
   return {ending.empty() ? "no ending" : "the ending \"" + ending + "\"", ""};

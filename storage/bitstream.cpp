@@ -111,7 +111,6 @@ Bytes BitstreamWriter::finish() const {
   return std::move(out).take();
 }
 
-namespace format = bitstream_format;
 namespace {
 
 constexpr const char* get_it_again = "get the file again from where it came from";
@@ -251,6 +250,7 @@ void Bitstream::parse_table(ByteReader& in) {
 void Bitstream::place_sections(std::span<const std::byte> bytes, std::size_t header_size, bool prefix_will_do) {
   std::span<const std::byte> rest = bytes.subspan(header_size);
   size_ = header_size;
+  available_ = bytes.size();
   for (Section& section : sections_) {
     if (section.size > std::numeric_limits<std::uint64_t>::max() - size_) fail("sizes that overflow", "true sizes");
     const bool whole = section.size <= rest.size();

@@ -96,8 +96,9 @@ class Bitstream {
   [[nodiscard]] const std::string& source() const noexcept { return source_; }
   [[nodiscard]] const BitstreamOptions& options() const noexcept { return options_; }
   [[nodiscard]] const MeasuredError& error() const noexcept { return error_; }
-  // The bytes of the whole stream, and whether they are all here.
+  // The bytes of the whole stream as it says, those of them that are here, and whether these are all.
   [[nodiscard]] std::uint64_t size() const noexcept { return size_; }
+  [[nodiscard]] std::uint64_t available() const noexcept { return available_; }
   [[nodiscard]] bool complete() const noexcept { return complete_; }
 
   // Throws Error{bad_input} when the stream is of another kind.
@@ -152,6 +153,7 @@ class Bitstream {
   std::vector<Section> sections_;
   std::map<std::string, std::size_t, std::less<>> by_name_;
   std::uint64_t size_ = 0;
+  std::uint64_t available_ = 0;
   bool complete_ = true;
 };
 

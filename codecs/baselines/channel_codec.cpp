@@ -1,4 +1,4 @@
-// The search for the tolerance that meets a target.
+// The codecs over channels: how they meet a target, and how their streams are decoded.
 #include "kinespace/codecs/baselines/channel_codec.h"
 
 #include <algorithm>

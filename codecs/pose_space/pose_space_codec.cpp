@@ -20,7 +20,7 @@
 namespace kinespace {
 namespace {
 
-constexpr std::array codec_settings{
+constexpr std::array pose_space_settings{
     CodecSetting{"step", 2.5, 1e-6, 1e6, "quantiser step where no target is given, in cm times the root of the joints"},
     CodecSetting{"shell_ratio", 1.6, 1.05, 100, "largest shell error, as a multiple of the mean joint error"},
     CodecSetting{"rate_weight", 0.18, 0, 1, "squared steps that a bit is worth when values are chosen"},
@@ -31,7 +31,7 @@ constexpr std::array codec_settings{
 }  // namespace
 
 std::span<const CodecSetting> PoseSpaceCodec::settings() const {
-  return codec_settings;
+  return pose_space_settings;
 }
 
 Bytes PoseSpaceCodec::encode(std::span<const Clip> clips, const CodecOptions& options) const {

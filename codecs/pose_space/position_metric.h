@@ -37,4 +37,7 @@ struct PoseMetric {
 // L^-T B, likewise.
 [[nodiscard]] Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& lower, const Eigen::MatrixXd& right);
 
+// Poses of all clips that a metric is the mean of.
+inline constexpr std::size_t metric_samples = 256;
+
 }  // namespace kinespace

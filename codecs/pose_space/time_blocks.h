@@ -48,4 +48,7 @@ class WindowTransform {
   std::vector<double> table_;  // [point of the first half][even functions, then odd ones]
 };
 
+// Components that windows are planned by: nearly all of the energy.
+inline constexpr int planned_components = 16;
+
 }  // namespace kinespace

@@ -1,4 +1,4 @@
-// The encoder of the qbc codec, and the search for the limit that meets a target.
+// The encoder and the decoder of the qbc codec.
 #include "kinespace/codecs/qbc/qbc_codec.h"
 
 #include <algorithm>
@@ -175,8 +175,6 @@ Bytes QbcCodec::encode(std::span<const Clip> clips, const CodecOptions& options)
   if (!kept) cannot_meet(fmt::format("max_squared_distance = {}", plan.limit), "a larger one");
   return std::move(result.stream);
 }
-
-// Decoding of qbc streams.
 
 namespace {
 

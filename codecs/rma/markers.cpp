@@ -40,7 +40,7 @@ struct RigidPoints {
   std::vector<Eigen::Vector3d> ends;
 };
 
-Eigen::Vector3d farthest(std::span<const Eigen::Vector3d> points) {
+Eigen::Vector3d farthest_of(std::span<const Eigen::Vector3d> points) {
   Eigen::Vector3d out = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& p : points) {
     if (p.norm() > out.norm() * (1 + 1e-9)) out = p;
@@ -49,9 +49,9 @@ Eigen::Vector3d farthest(std::span<const Eigen::Vector3d> points) {
 }
 
 Eigen::Vector3d choose_along(const RigidPoints& points) {
-  Eigen::Vector3d joint = farthest(points.joints);
+  Eigen::Vector3d joint = farthest_of(points.joints);
   if (joint.norm() >= short_bone_cm) return joint;
-  Eigen::Vector3d direction = joint.norm() > 1e-3 ? joint : farthest(points.ends);
+  Eigen::Vector3d direction = joint.norm() > 1e-3 ? joint : farthest_of(points.ends);
   if (direction.norm() < 1e-3) direction = Eigen::Vector3d::UnitY();
   return marker_cm * direction.normalized();
 }

@@ -13,7 +13,7 @@
 namespace kinespace {
 namespace {
 
-constexpr std::array codec_settings{
+constexpr std::array rma_settings{
     CodecSetting::choice("profile", "default", "paper", "the paper's rules, or what goes beyond them"),
     CodecSetting{"variance", 95, 30, 100, "paper's profile without a target: percent of variance that the axes keep"},
     CodecSetting{"step", 15, 1e-6, 1e6,
@@ -29,7 +29,7 @@ constexpr std::array codec_settings{
 }  // namespace
 
 std::span<const CodecSetting> RmaCodec::settings() const {
-  return codec_settings;
+  return rma_settings;
 }
 
 Bytes RmaCodec::encode(std::span<const Clip> clips, const CodecOptions& options) const {
@@ -52,6 +52,7 @@ Bytes RmaCodec::encode(std::span<const Clip> clips, const CodecOptions& options)
 std::vector<std::vector<int>> rma_seams(std::span<const std::byte> bytes, std::string source) {
   const Bitstream stream = Bitstream::parse(bytes, std::move(source));
   stream.require_kind(stream_kind("rma"));
+  static_cast<void>(payload_version(stream, RmaCodec().versions()));
   const ClipTable table = unpack_clip_table(stream.section("clips"), most_frames(stream.size()), stream.source());
   const std::int64_t numbers = most_numbers(stream.size());
   std::vector<std::vector<int>> out(table.clips.size());

@@ -9,13 +9,19 @@
 
 namespace kinespace {
 
+namespace {
+
+Bitstream required(Bitstream stream, bool whole) {
+  if (!whole || stream.complete()) return stream;
+  throw Error(ErrorKind::bad_input,
+              {.file = stream.source(), .found = "the beginning of a stream", .expected = "all of it (cut short)"});
+}
+
+}  // namespace
+
 ClipReader::ClipReader(Bitstream stream, std::span<const Skeleton> known, Length length)
-    : stream_(std::move(stream)),
-      table_(unpack_clip_table(stream_.section("clips"), most_frames(stream_.size()), stream_.source(), known)) {
-  if (length == Length::whole && !stream_.complete()) {
-    throw Error(ErrorKind::bad_input,
-                {.file = stream_.source(), .found = "the beginning of a stream", .expected = "all of it (cut short)"});
-  }
+    : stream_(required(std::move(stream), length == Length::whole)),
+      table_(unpack_clip_table(stream_.section("clips"), most_frames(stream_.available()), stream_.source(), known)) {
   if (stream_.has_section("padding")) static_cast<void>(stream_.section("padding"));
   for (const ClipEntry& clip : table_.clips) summaries_.push_back({clip.name, clip.rate_hz, clip.frames});
 }

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include <tbb/parallel_for.h>
 
@@ -18,8 +19,8 @@ constexpr std::int64_t most_joints = 4096;
 constexpr std::int64_t longest_name = 1 << 16;
 constexpr std::int64_t most_side_bytes = std::int64_t{1} << 30;
 
-// Contexts of integer_model.h, by what the number is.
-enum Kind : int {
+// Contexts of entropy/integer_coder.h, by what the number is.
+enum TableNumber : int {
   count,
   length,
   parent,
@@ -201,7 +202,7 @@ void get_blocks(IntegerReader& in, ClipEntry& clip, int before, std::int64_t mos
     if (b < 1 || b > longest_block) in.damaged();
     before = static_cast<int>(b);
     frames += b;
-    if (frames > most_frames) in.damaged();
+    if (frames > std::min<std::int64_t>(most_frames, std::numeric_limits<int>::max())) in.damaged();
     clip.blocks.push_back(before);
   }
   clip.frames = static_cast<int>(frames);

@@ -89,4 +89,10 @@ class PoseWriter {
   std::vector<int> above_;  // the joints above the travel root, from joint 0 down
 };
 
+// The vectors of a clip as they lie: [dimension][frame].
+using PoseCurves = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
+[[nodiscard]] inline PoseCurves pose_curves(const PoseVectors& vectors, int dimensions) {
+  return {vectors.values.data(), dimensions, vectors.frames};
+}
+
 }  // namespace kinespace

@@ -20,8 +20,11 @@ class Bracket {
   explicit Bracket(bool bytes) : slope_(bytes ? -1.4 : 1.1), aim_(std::log(bytes ? 0.996 : 0.993)) {}
 
   void tell(double coarseness, double ratio) {
-    std::optional<Side>& side = ratio <= 0 ? met_ : missed_;
-    const bool coarser_is_nearer = (ratio <= 0) == (slope_ > 0);
+    const bool met = ratio <= 0;
+    in_a_row_ = met == last_met_ ? in_a_row_ + 1 : 1;
+    last_met_ = met;
+    std::optional<Side>& side = met ? met_ : missed_;
+    const bool coarser_is_nearer = met == (slope_ > 0);
     if (!side || (coarseness > side->coarseness) == coarser_is_nearer) side = {coarseness, ratio};
   }
 
@@ -29,7 +32,11 @@ class Bracket {
     return met_ && missed_ && std::abs(met_->coarseness - missed_->coarseness) < 0.002;
   }
 
-  // After one at which the ratio was so: on the line between both sides, kept off its ends; else onwards by what the ratio asks.
+  // Where errors or sizes jump, the target may be met once more beyond the jump.
+  [[nodiscard]] double beyond(int times) const { return met_->coarseness + (slope_ > 0 ? 0.1 : -0.1) * times; }
+
+  // After one at which the ratio was so: on the line between both sides, kept off its ends; else onwards by what the ratio
+  // asks, and by twice as much each time that the other side is not come to (most of a stream may not depend on it).
   [[nodiscard]] double next(double coarseness, double ratio) const {
     if (met_ && missed_) {
       const double share = missed_->ratio > met_->ratio
@@ -37,8 +44,9 @@ class Bracket {
                                : 0.5;
       return met_->coarseness + share * (missed_->coarseness - met_->coarseness);
     }
-    const double onwards = (ratio <= 0) == (slope_ > 0) ? 0.02 : -0.02;
-    return coarseness + std::clamp((aim_ - ratio) * slope_, -2.0, 2.0) + onwards;
+    const double asked = std::clamp(std::abs((aim_ - ratio) * slope_), 0.02, 2.0);
+    const double onwards = std::min(asked * std::exp2(std::max(0, in_a_row_ - 2)), 3.0);
+    return coarseness + ((ratio <= 0) == (slope_ > 0) ? onwards : -onwards);
   }
 
  private:
@@ -47,6 +55,8 @@ class Bracket {
   };
   double slope_, aim_;  // of the coarseness over the ratio; the ratio to come to
   std::optional<Side> met_, missed_;
+  bool last_met_ = false;
+  int in_a_row_ = 0;
 };
 
 }  // namespace
@@ -55,22 +65,34 @@ Bytes search_target(const CodecTarget& target, const SearchRange& range,
                     const std::function<CodedAttempt(double)>& attempt) {
   const bool bytes = target.bytes.has_value();
   Bytes best;
-  Bracket bracket(bytes);
-  double coarseness = range.start;
-  for (int round = 0; round < 2 * range.rounds; ++round) {
+  // The log of what was reached over what was asked for.
+  const auto ratio_at = [&](double coarseness) {
     CodedAttempt made = attempt(coarseness);
     const double ratio = ratio_of(target, made);
-    const bool met = ratio <= 1;
     const bool better = best.empty() || (bytes ? made.stream.size() > best.size() : made.stream.size() < best.size());
-    if (met && better) best = std::move(made.stream);
-    if (met && ratio >= range.close) break;
-    if (!best.empty() && round + 1 >= range.rounds) break;
-    const bool coarser = met != bytes;
-    if (coarser ? coarseness >= range.most : coarseness <= range.least) break;
-    const double log_ratio = std::log(std::max(ratio, 1e-6));
-    bracket.tell(std::log(coarseness), log_ratio);
-    if (bracket.narrow()) break;
-    coarseness = std::clamp(std::exp(bracket.next(std::log(coarseness), log_ratio)), range.least, range.most);
+    if (ratio <= 1 && better) best = std::move(made.stream);
+    return std::log(std::max(ratio, 1e-6));
+  };
+  const double least = std::log(range.least), most = std::log(range.most);
+  Bracket bracket(bytes);
+  double coarseness = std::log(range.start);
+  for (int round = 0, since_met = 0; round < 2 * range.rounds && since_met < range.rounds; ++round) {
+    const double ratio = ratio_at(std::exp(coarseness));
+    const bool met = ratio <= 0;
+    if (met && ratio >= std::log(range.close)) return best;
+    since_met += best.empty() ? 0 : 1;
+    const bool to_coarser = met != bytes;
+    if (to_coarser ? coarseness >= most : coarseness <= least) break;
+    bracket.tell(coarseness, ratio);
+    if (bracket.narrow()) {
+      for (const int times : {1, 2, 3}) {
+        const double there = std::clamp(bracket.beyond(times), least, most);
+        const double found = ratio_at(std::exp(there));
+        if (found <= 0 && found >= std::log(range.close)) break;
+      }
+      break;
+    }
+    coarseness = std::clamp(bracket.next(coarseness, ratio), least, most);
   }
   if (best.empty()) cannot_meet(target);
   return best;

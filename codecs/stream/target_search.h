@@ -1,5 +1,5 @@
 // The search for one number, a coarseness, with which a codec meets a target: error and size both follow it. All codecs of
-// clips meet their targets by it, but for the errors of motion-space, which moves two numbers at once.
+// clips that can lose something meet their targets by it, but for the errors of motion-space, which moves two numbers at once.
 #pragma once
 
 #include <functional>
@@ -13,7 +13,7 @@ struct SearchRange {
   double start = 1;
   double least = 1e-4;
   double most = 1e3;
-  int rounds = 9;        // attempts at most once the target is met; twice as many before
+  int rounds = 9;        // attempts at most from the first that meets the target on; twice as many in all
   double close = 0.985;  // an error or size within this share of the target ends the search
 };
 

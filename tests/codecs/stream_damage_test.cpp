@@ -52,17 +52,28 @@ TEST(StreamDamage, huge_counts_in_a_small_stream_are_refused_before_anything_is_
   clip.finer.assign(40000, 0);
   EXPECT_FALSE(stream_decodes(forged("clips", pack_clip_table(table))));
 
-  PoseSpaceTables tables = unpack_motion_space_tables(
+  PoseSpaceTables tables = unpack_pose_space_tables(
       stream.section("tables"), static_cast<int>(table.skeletons.front().rotating_joints().size()), "s");
   tables.basis.components = 4000;
-  EXPECT_FALSE(stream_decodes(forged("tables", pack_motion_space_tables(tables))));
+  EXPECT_FALSE(stream_decodes(forged("tables", pack_pose_space_tables(tables))));
   tables.basis.components = static_cast<int>(tables.basis.exponents.size());
   tables.step = 1e300;
-  EXPECT_FALSE(stream_decodes(forged("tables", pack_motion_space_tables(tables))));
+  EXPECT_FALSE(stream_decodes(forged("tables", pack_pose_space_tables(tables))));
 
   ByteWriter layer;
   put_varint(layer, std::uint64_t{1} << 62);
   EXPECT_FALSE(stream_decodes(forged("layers", std::move(layer).take())));
+}
+
+// A stream that was cut short may say anything of how long it was: what is here of it counts.
+TEST(StreamDamage, frames_are_believed_by_the_bytes_that_are_here) {
+  ClipTable table = unpack_clip_table(test::part(test::sample_stream(), "clips"), 1 << 20, "s");
+  table.clips.front().blocks.assign(40000, 512);  // 20 million frames
+  table.clips.front().finer.assign(40000, 0);
+  const Bytes many = forged("clips", pack_clip_table(table));
+  const std::uint64_t beginning = Bitstream::parse(many, "s").prefix_size("layers", 0);
+  const Bytes long_one = test::forged(many, "layers", Bytes(std::size_t{1} << 24, std::byte{1}));
+  EXPECT_FALSE(stream_decodes(std::span(long_one).first(static_cast<std::size_t>(beginning) + 100)));
 }
 
 }  // namespace

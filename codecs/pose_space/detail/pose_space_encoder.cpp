@@ -17,15 +17,6 @@
 namespace kinespace {
 namespace {
 
-constexpr std::size_t metric_samples = 256;
-constexpr int planned_components = 16;  // that windows are planned by: nearly all of the energy
-
-using Curves = Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>;
-
-Curves curves_of(const PoseVectors& vectors, int dimensions) {
-  return {vectors.values.data(), dimensions, vectors.frames};
-}
-
 std::vector<int> equal_windows(int frames, int wanted) {
   const int count = std::max(1, (frames + wanted / 2) / wanted);
   std::vector<int> out;
@@ -77,7 +68,7 @@ void PoseSpaceEncoder::add_moments() {
   const int d = reference_.dimensions();
   std::vector<Eigen::MatrixXd> parts(vectors_.size());
   tbb::parallel_for(std::size_t{0}, vectors_.size(), [&](std::size_t c) {
-    const Curves x = curves_of(vectors_[c], d);
+    const PoseCurves x = pose_curves(vectors_[c], d);
     parts[c] = Eigen::MatrixXd::Zero(d, d);
     parts[c].selfadjointView<Eigen::Lower>().rankUpdate(x);
   });
@@ -95,7 +86,7 @@ void PoseSpaceEncoder::add_metrics() {
   tbb::parallel_for(std::int64_t{0}, samples, [&](std::int64_t s) {
     const std::int64_t frame = (2 * s + 1) * frames_ / (2 * samples);
     const auto c = static_cast<std::size_t>(std::ranges::upper_bound(first, frame) - first.begin()) - 1;
-    const Eigen::VectorXd pose = curves_of(vectors_[c], d).col(frame - first[c]);
+    const Eigen::VectorXd pose = pose_curves(vectors_[c], d).col(frame - first[c]);
     const Skeleton& skeleton = table_.skeletons[static_cast<std::size_t>(table_.clips[c].skeleton)];
     parts[static_cast<std::size_t>(s)] =
         pose_metric(skeleton, reference_, std::span(pose.data(), static_cast<std::size_t>(d)));
@@ -178,7 +169,7 @@ void PoseSpaceEncoder::cut(std::size_t c, double step, const PoseSpaceSettings& 
   const int d = reference_.dimensions();
   const int planned = std::min(planned_components, d);
   const RowMatrix analysis = (exact_.basis.transpose() * metric_).topRows(planned) / step;
-  const RowMatrix z = analysis * curves_of(vectors_[c], d);
+  const RowMatrix z = analysis * pose_curves(vectors_[c], d);
   ClipEntry& clip = table_.clips[c];
   const std::vector<int> jumps = find_jumps(z, step, vectors_[c].jumps);
   if (settings.window_s > 0) {

@@ -79,7 +79,7 @@ Bytes PoseSpaceSearch::for_max_error(double target) {
 }
 
 Bytes PoseSpaceSearch::for_bytes(std::int64_t target) {
-  constexpr SearchRange range{.start = 2.5, .least = 1e-4, .most = 1e5, .rounds = 8};
+  constexpr SearchRange range{.start = 2.5, .least = 1e-4, .most = 1e5, .rounds = 16};
   settle(range.start);
   return search_target({.bytes = target}, range, [&](double step) {
     return CodedAttempt{.stream = encoder_.finish(encoder_.attempt(step, settings_, &*last_)), .error = {}};

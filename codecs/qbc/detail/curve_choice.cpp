@@ -1,4 +1,4 @@
-// The choice of numbers, and of all of it together.
+// The choice of breaks, of numbers, and of all of it together.
 #include "kinespace/codecs/qbc/detail/curve_choice.h"
 
 #include <algorithm>

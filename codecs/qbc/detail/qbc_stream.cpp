@@ -9,8 +9,8 @@
 namespace kinespace {
 namespace {
 
-// Contexts of integer_model.h.
-enum Kind : int { interval_number, unit_flag, step_number, finer_number, grid_number, size_number };
+// Contexts of entropy/integer_coder.h.
+enum CurveNumber : int { interval_number, unit_flag, step_number, finer_number, grid_number, size_number };
 
 constexpr int coarsest_grid_log = 5;
 constexpr std::int64_t largest_curve = std::int64_t{1} << 34;

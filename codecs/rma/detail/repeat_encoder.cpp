@@ -18,15 +18,7 @@
 namespace kinespace {
 namespace {
 
-constexpr std::size_t metric_samples = 256;
-constexpr int planned_components = 16;
-
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-using Curves = Eigen::Map<const RowMatrix>;
-
-Curves curves_of(const PoseVectors& vectors, int dimensions) {
-  return {vectors.values.data(), dimensions, vectors.frames};
-}
 
 double bits_of(std::span<const double> coefficients, double step) {
   double out = 0;
@@ -74,7 +66,7 @@ void RepeatEncoder::add_statistics() {
   const std::int64_t frames = first.back();
   tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
     moments[c] = Eigen::MatrixXd::Zero(d, d);
-    moments[c].selfadjointView<Eigen::Lower>().rankUpdate(curves_of(aligned_.vectors[c], d));
+    moments[c].selfadjointView<Eigen::Lower>().rankUpdate(pose_curves(aligned_.vectors[c], d));
   });
   Eigen::MatrixXd total = Eigen::MatrixXd::Zero(d, d);
   for (const Eigen::MatrixXd& one : moments) total += one;
@@ -85,7 +77,7 @@ void RepeatEncoder::add_statistics() {
   tbb::parallel_for(std::int64_t{0}, samples, [&](std::int64_t s) {
     const std::int64_t frame = (2 * s + 1) * frames / (2 * samples);
     const auto c = static_cast<std::size_t>(std::ranges::upper_bound(first, frame) - first.begin()) - 1;
-    const Eigen::VectorXd pose = curves_of(aligned_.vectors[c], d).col(frame - first[c]);
+    const Eigen::VectorXd pose = pose_curves(aligned_.vectors[c], d).col(frame - first[c]);
     metrics[static_cast<std::size_t>(s)] =
         pose_metric(clips_[c].skeleton, aligned_.reference, std::span(pose.data(), static_cast<std::size_t>(d)));
   });
@@ -101,7 +93,7 @@ void RepeatEncoder::add_statistics() {
 void RepeatEncoder::cut(std::size_t clip, double step) {
   const int d = aligned_.reference.dimensions();
   const int planned = std::min(planned_components, d);
-  RowMatrix z = (exact_.basis.transpose() * metric_).topRows(planned) * curves_of(aligned_.vectors[clip], d);
+  RowMatrix z = (exact_.basis.transpose() * metric_).topRows(planned) * pose_curves(aligned_.vectors[clip], d);
   ClipEntry& entry = table_.clips[clip];
   const std::vector<int> jumps = find_jumps(z, 1, aligned_.vectors[clip].jumps);
   z /= step;
@@ -117,7 +109,7 @@ void RepeatEncoder::plan(double step) {
   jumps_.clear();
   for (std::size_t c = 0; c < clips_.size(); ++c) {
     const int d = aligned_.reference.dimensions();
-    const Curves x = curves_of(aligned_.vectors[c], d);
+    const PoseCurves x = pose_curves(aligned_.vectors[c], d);
     const RowMatrix analysis = (exact_.basis.transpose() * metric_).topRows(std::min(planned_components, d));
     const std::vector<int> jumps = find_jumps(analysis * x, 1, aligned_.vectors[c].jumps);
     int first = 0;
@@ -205,7 +197,7 @@ std::vector<double> RepeatEncoder::predicted_from_originals(std::size_t w, const
 std::vector<double> RepeatEncoder::analyse(std::size_t w, std::span<const double> vectors,
                                            const Eigen::MatrixXd& projection) const {
   const WindowPlace& window = windows_[w];
-  const RowMatrix z = projection * Curves(vectors.data(), projection.cols(), window.points);
+  const RowMatrix z = projection * PoseCurves(vectors.data(), projection.cols(), window.points);
   const WindowTransform& transform = *transforms_[w];
   std::vector<double> out(static_cast<std::size_t>(z.rows()) * static_cast<std::size_t>(transform.functions()));
   transform.analyse(z.data(), z.cols(), static_cast<int>(z.rows()), out.data());
