@@ -70,14 +70,17 @@ const CodecSetting& find_setting(const Codec& codec, std::string_view name) {
 }
 
 Bytes encode(std::string_view codec, std::span<const Clip> clips, const CodecOptions& options) {
-  const Codec& found = find_codec(codec);
+  return encode(find_codec(codec), clips, options);
+}
+
+Bytes encode(const Codec& codec, std::span<const Clip> clips, const CodecOptions& options) {
   options.target.validate();
-  check_settings(found, options);
+  check_settings(codec, options);
   check_clips(clips);
-  if (options.basis != nullptr && !found.takes_basis()) {
-    throw Error(ErrorKind::usage, {.found = fmt::format("a basis for codec {}", codec), .expected = "none"});
+  if (options.basis != nullptr && !codec.takes_basis()) {
+    throw Error(ErrorKind::usage, {.found = fmt::format("a basis for codec {}", codec.name()), .expected = "none"});
   }
-  return found.encode(clips, options);
+  return codec.encode(clips, options);
 }
 
 bool is_clip_stream(std::span<const std::byte> bytes) {

@@ -17,6 +17,8 @@ namespace kinespace {
 
 // Checks clips and options, then encodes.
 [[nodiscard]] Bytes encode(std::string_view codec, std::span<const Clip> clips, const CodecOptions& options = {});
+// The same by a codec that need not be registered.
+[[nodiscard]] Bytes encode(const Codec& codec, std::span<const Clip> clips, const CodecOptions& options = {});
 
 // Whether the bytes are a stream of clips, whole or the beginning of one.
 [[nodiscard]] bool is_clip_stream(std::span<const std::byte> bytes);

@@ -6,6 +6,7 @@
 
 #include "kinespace/base/error.h"
 #include "tests/codecs/sample_stream.h"
+#include "tests/codecs/toy_codec.h"
 #include "tests/support/allocation_meter.h"
 #include "tests/support/forged_stream.h"
 
@@ -15,13 +16,18 @@ namespace {
 constexpr std::size_t base_memory = std::size_t{64} << 20;
 constexpr std::size_t memory_a_byte = 16;
 
+// As open_stream does, by a codec that need not be registered.
+std::unique_ptr<StreamReader> open(const Codec& codec, std::span<const std::byte> bytes, std::string source) {
+  return codec.open(Bitstream::parse_prefix(bytes, std::move(source)));
+}
+
 // True when the bytes gave clips. No more memory than the stream's size allows, clips handed out not counted.
-bool decodes(std::span<const std::byte> bytes) {
+bool decodes(const Codec& codec, std::span<const std::byte> bytes) {
   const test::AllocationMeter meter;
   bool good = false;
   std::size_t clip_bytes = 0;
   try {
-    const auto reader = open_stream(bytes, "damaged.ksm");
+    const auto reader = open(codec, bytes, "damaged.ksm");
     for (std::size_t c = 0; c < reader->clips().size(); c += 2) {
       const Clip clip = reader->decode(c);
       EXPECT_EQ(clip.frames, reader->clips()[c].frames);
@@ -39,6 +45,7 @@ bool decodes(std::span<const std::byte> bytes) {
 
 class CodecDamage : public testing::TestWithParam<const Codec*> {
  protected:
+  [[nodiscard]] static bool decodes(std::span<const std::byte> bytes) { return kinespace::decodes(*GetParam(), bytes); }
   // Four short clips with the codec's own settings, made once.
   [[nodiscard]] const Bytes& stream() const {
     static std::map<std::string, Bytes, std::less<>> streams;
@@ -50,7 +57,7 @@ class CodecDamage : public testing::TestWithParam<const Codec*> {
       const Clip& clip = test::sample_clips()[c];
       clips.push_back(slice(clip, 0, std::min(clip.frames, 60)));
     }
-    return streams.emplace(name, encode(name, clips)).first->second;
+    return streams.emplace(name, encode(*GetParam(), clips)).first->second;
   }
 };
 
@@ -59,7 +66,7 @@ TEST_P(CodecDamage, every_prefix_is_a_coarser_stream_or_an_error) {
   for (std::size_t n = 0; n < stream().size(); n += n < 64 ? 1 : stride) {
     const bool good = decodes(std::span(stream()).first(n));
     if (good) {
-      EXPECT_GT(open_stream(stream(), "s")->levels(), 1) << "a codec without levels took a prefix of " << n;
+      EXPECT_GT(open(*GetParam(), stream(), "s")->levels(), 1) << "a codec without levels took a prefix of " << n;
     }
   }
 }
@@ -107,7 +114,7 @@ TEST_P(CodecDamage, forged_parts_with_fitting_checksums_are_errors_or_clips) {
 TEST_P(CodecDamage, targets_that_cannot_be_met_are_refused) {
   const Clip clip = slice(test::sample_clips().front(), 0, 30);
   try {
-    static_cast<void>(encode(GetParam()->name(), std::span(&clip, 1), {.target = {.bytes = 60}}));
+    static_cast<void>(encode(*GetParam(), std::span(&clip, 1), {.target = {.bytes = 60}}));
     ADD_FAILURE() << "a clip in 60 bytes";
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::usage) << error.what();
@@ -118,7 +125,7 @@ TEST_P(CodecDamage, clips_that_are_no_motion_are_refused) {
   Clip clip = slice(test::sample_clips().front(), 0, 30);
   clip.rotations[17] = std::numeric_limits<double>::quiet_NaN();
   try {
-    static_cast<void>(encode(GetParam()->name(), std::span(&clip, 1)));
+    static_cast<void>(encode(*GetParam(), std::span(&clip, 1)));
     ADD_FAILURE() << "NaN was encoded";
   } catch (const Error& error) {
     EXPECT_EQ(error.kind(), ErrorKind::bad_input) << error.what();
@@ -128,8 +135,8 @@ TEST_P(CodecDamage, clips_that_are_no_motion_are_refused) {
 TEST_P(CodecDamage, clips_of_one_frame_and_of_ten_are_clips) {
   for (const int frames : {1, 2, 3, 10}) {
     const Clip clip = slice(test::sample_clips()[1], 5, frames);
-    const Bytes bytes = encode(GetParam()->name(), std::span(&clip, 1));
-    const Clip decoded = open_stream(bytes, "s")->decode(0);
+    const Bytes bytes = encode(*GetParam(), std::span(&clip, 1));
+    const Clip decoded = open(*GetParam(), bytes, "s")->decode(0);
     ASSERT_EQ(decoded.frames, frames);
     EXPECT_EQ(decoded.name, clip.name);
     EXPECT_LT(clip_error(clip, decoded, 0, frames, 0).mean_cm(), 5) << frames;
@@ -139,11 +146,11 @@ TEST_P(CodecDamage, clips_of_one_frame_and_of_ten_are_clips) {
 TEST_P(CodecDamage, targets_are_met_on_the_decoded_clips) {
   std::vector<Clip> clips;
   for (std::size_t c = 0; c < 3; ++c) clips.push_back(slice(test::sample_clips()[c], 0, 60));
-  const Bytes plain = encode(GetParam()->name(), clips, {.target = {.mean_error_cm = 1}});
+  const Bytes plain = encode(*GetParam(), clips, {.target = {.mean_error_cm = 1}});
   for (const CodecTarget& target : {CodecTarget{.mean_error_cm = 1.5}, CodecTarget{.max_error_cm = 4},
                                     CodecTarget{.bytes = static_cast<std::int64_t>(plain.size() * 11 / 10)}}) {
-    const Bytes bytes = encode(GetParam()->name(), clips, {.target = target});
-    const std::vector<Clip> decoded = open_stream(bytes, "s")->decode_all();
+    const Bytes bytes = encode(*GetParam(), clips, {.target = target});
+    const std::vector<Clip> decoded = open(*GetParam(), bytes, "s")->decode_all();
     ClipErrorSums error;
     for (std::size_t c = 0; c < clips.size(); ++c) error.add(clip_error(clips[c], decoded[c], 0, clips[c].frames, 0));
     if (target.mean_error_cm) {
@@ -155,7 +162,7 @@ TEST_P(CodecDamage, targets_are_met_on_the_decoded_clips) {
     if (target.bytes) {
       EXPECT_LE(static_cast<std::int64_t>(bytes.size()), *target.bytes);
     }
-    EXPECT_NEAR(open_stream(bytes, "s")->stream().error().mean_joint_error_cm, error.mean_cm(), 1e-4);
+    EXPECT_NEAR(open(*GetParam(), bytes, "s")->stream().error().mean_joint_error_cm, error.mean_cm(), 1e-4);
   }
 }
 
@@ -185,9 +192,9 @@ Clip long_clip(int frames) {
 
 TEST_P(CodecDamage, a_clip_of_a_hundred_thousand_frames_comes_back_whole_and_in_parts) {
   const Clip clip = long_clip(100'000);
-  const Bytes bytes = encode(GetParam()->name(), std::span(&clip, 1));
+  const Bytes bytes = encode(*GetParam(), std::span(&clip, 1));
   EXPECT_LT(bytes.size(), clip.rotations.size() * sizeof(float));
-  const auto reader = open_stream(bytes, "s");
+  const auto reader = open(*GetParam(), bytes, "s");
   const Clip decoded = reader->decode(0);
   ASSERT_EQ(decoded.frames, clip.frames);
   const ClipErrorSums error = clip_error(clip, decoded, 0, clip.frames, 0);
@@ -196,14 +203,21 @@ TEST_P(CodecDamage, a_clip_of_a_hundred_thousand_frames_comes_back_whole_and_in_
   EXPECT_EQ(part.rotation(2, 49).coeffs(), decoded.rotation(2, 77'049).coeffs());
 }
 
-INSTANTIATE_TEST_SUITE_P(Codecs, CodecDamage, testing::ValuesIn(all_codecs().begin(), all_codecs().end()),
-                         [](const auto& codec) {
-                           std::string name(codec.param->name());
-                           for (char& c : name) {
-                             if (c == '-' || c == '+') c = '_';
-                           }
-                           return name;
-                         });
+// Those of the registry, and one that is nowhere else.
+std::vector<const Codec*> codecs_and_a_toy() {
+  static const test::ToyCodec toy;
+  std::vector<const Codec*> out(all_codecs().begin(), all_codecs().end());
+  out.push_back(&toy);
+  return out;
+}
+
+INSTANTIATE_TEST_SUITE_P(Codecs, CodecDamage, testing::ValuesIn(codecs_and_a_toy()), [](const auto& codec) {
+  std::string name(codec.param->name());
+  for (char& c : name) {
+    if (c == '-' || c == '+') c = '_';
+  }
+  return name;
+});
 
 }  // namespace
 }  // namespace kinespace
