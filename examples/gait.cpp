@@ -2,6 +2,10 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include "kinespace/base/error.h"
+
 namespace kinespace::samples {
 
 using Eigen::Vector2d;
@@ -54,6 +58,15 @@ std::vector<FootTrack> plan_steps(const Gait& gait, const Build& build, double d
     feet.emplace_back(build.foot, std::move(plants));
   }
   return feet;
+}
+
+void require_step(double step_m, double longest_m) {
+  if (step_m <= longest_m) return;
+  throw Error(ErrorKind::usage, {.file = {},
+                                 .line = 0,
+                                 .found = fmt::format("steps of {:.2f} m", step_m),
+                                 .expected = fmt::format("at most {:.2f} m", longest_m),
+                                 .remedy = "raise cadence_per_min or lower speed_m_s"});
 }
 
 }  // namespace kinespace::samples

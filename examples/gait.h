@@ -52,4 +52,7 @@ struct Gait {
 [[nodiscard]] std::vector<FootTrack> plan_steps(const Gait& gait, const Build& build, double duration_s, Random& random,
                                                 double variation);
 
+// Throws Error{usage} for steps, in m, that legs of that size do not make.
+void require_step(double step_m, double longest_m);
+
 }  // namespace kinespace::samples

@@ -1,12 +1,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <fmt/format.h>
-
 #include "examples/gait.h"
 #include "examples/posture.h"
 #include "examples/sample_motions.h"
-#include "kinespace/base/error.h"
 
 namespace kinespace {
 namespace {
@@ -101,15 +98,7 @@ void WalkOptions::validate() const {
   require_range("arm_swing", arm_swing, 0, 2);
   require_range("start_phase", start_phase, 0, 1);
   require_range("duration_s", duration_s, 0.1, 600);
-  const double step = speed_m_s * 60 / cadence_of(*this);
-  const double longest = 0.53 * take.height_cm / 100;
-  if (step > longest) {
-    throw Error(ErrorKind::usage, {.file = {},
-                                   .line = 0,
-                                   .found = fmt::format("steps of {:.2f} m", step),
-                                   .expected = fmt::format("at most {:.2f} m", longest),
-                                   .remedy = "raise cadence_per_min or lower speed_m_s"});
-  }
+  require_step(speed_m_s * 60 / cadence_of(*this), 0.53 * take.height_cm / 100);
 }
 
 SampleMotion make_walk(const WalkOptions& options) {

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "kinespace/motion/simd.h"
+#include "kinespace/motion/sine_cosine.h"
 
 namespace kinespace {
 namespace {
@@ -15,7 +16,7 @@ constexpr int block = 64;
 constexpr double degrees_per_radian = 180 / std::numbers::pi;
 
 // sin and cos of half the angles. The half angle is reduced to [-45, 45] degrees by whole right angles, in degrees and
-// so without error, then the polynomials of fdlibm's kernels (S. Moshier's coefficients) hold to the last bit or so.
+// so without error.
 KINESPACE_VECTOR_CLONES
 void half_angle_sincos(const double* degrees, int count, double* sine, double* cosine) {
   constexpr double to_integer = 6755399441055744.0;  // 1.5 * 2^52: adding it leaves the integer in the low bits
@@ -23,20 +24,8 @@ void half_angle_sincos(const double* degrees, int count, double* sine, double* c
     const double shifted = degrees[i] * (1.0 / 180) + to_integer;
     const auto quadrant = std::bit_cast<std::uint64_t>(shifted);
     const double x = (degrees[i] - (shifted - to_integer) * 180) * (std::numbers::pi / 360);
-    const double z = x * x;
-    const double s = x + x * z *
-                             (-1.66666666666666324348e-01 +
-                              z * (8.33333333332248946124e-03 +
-                                   z * (-1.98412698298579493134e-04 +
-                                        z * (2.75573137070700676789e-06 +
-                                             z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-    const double c = 1 - 0.5 * z +
-                     z * z *
-                         (4.16666666666666019037e-02 +
-                          z * (-1.38888888888741095749e-03 +
-                               z * (2.48015872894767294178e-05 +
-                                    z * (-2.75573143513906633035e-07 +
-                                         z * (2.08757232129817482790e-09 - z * 1.13596475577881948265e-11)))));
+    double s = 0, c = 0;
+    sine_and_cosine_near_zero(x, s, c);
     const std::uint64_t swap = 0 - (quadrant & 1);
     const auto s_bits = std::bit_cast<std::uint64_t>(s);
     const auto c_bits = std::bit_cast<std::uint64_t>(c);

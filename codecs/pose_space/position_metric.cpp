@@ -3,6 +3,8 @@
 #include <cmath>
 #include <vector>
 
+#include <tbb/parallel_for.h>
+
 #include "kinespace/codecs/stream/natural_functions.h"
 #include "kinespace/motion/error_measures.h"
 
@@ -181,6 +183,44 @@ Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& lower, const Eigen::Matr
       for (Eigen::Index k = r + 1; k < n; ++k) sum -= lower(k, r) * out(k, c);
       out(r, c) = sum / lower(r, r);
     }
+  }
+  return out;
+}
+
+Eigen::MatrixXd pose_moments(std::span<const PoseVectors> vectors, int dimensions) {
+  std::vector<Eigen::MatrixXd> parts(vectors.size());
+  tbb::parallel_for(std::size_t{0}, vectors.size(), [&](std::size_t c) {
+    parts[c] = Eigen::MatrixXd::Zero(dimensions, dimensions);
+    parts[c].selfadjointView<Eigen::Lower>().rankUpdate(pose_curves(vectors[c], dimensions));
+  });
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(dimensions, dimensions);
+  std::int64_t frames = 0;
+  for (std::size_t c = 0; c < vectors.size(); ++c) {
+    out += parts[c];
+    frames += vectors[c].frames;
+  }
+  return Eigen::MatrixXd(out.selfadjointView<Eigen::Lower>()) / static_cast<double>(frames);
+}
+
+PoseMetric mean_pose_metric(std::span<const Clip> clips, std::span<const PoseVectors> vectors,
+                            const ReferencePose& reference) {
+  constexpr std::int64_t most_samples = 256;
+  const int d = reference.dimensions();
+  std::vector<std::int64_t> first{0};
+  for (const PoseVectors& v : vectors) first.push_back(first.back() + v.frames);
+  const std::int64_t samples = std::min(first.back(), most_samples);
+  std::vector<PoseMetric> parts(static_cast<std::size_t>(samples));
+  tbb::parallel_for(std::int64_t{0}, samples, [&](std::int64_t s) {
+    const std::int64_t frame = (2 * s + 1) * first.back() / (2 * samples);
+    const auto c = static_cast<std::size_t>(std::ranges::upper_bound(first, frame) - first.begin()) - 1;
+    const Eigen::VectorXd pose = pose_curves(vectors[c], d).col(frame - first[c]);
+    parts[static_cast<std::size_t>(s)] =
+        pose_metric(clips[c].skeleton, reference, std::span(pose.data(), static_cast<std::size_t>(d)));
+  });
+  PoseMetric out{Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd::Zero(d, d)};
+  for (const PoseMetric& part : parts) {
+    out.positions += part.positions / static_cast<double>(samples);
+    out.shell += part.shell / static_cast<double>(samples);
   }
   return out;
 }

@@ -37,7 +37,10 @@ struct PoseMetric {
 // L^-T B, likewise.
 [[nodiscard]] Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& lower, const Eigen::MatrixXd& right);
 
-// Poses of all clips that a metric is the mean of.
-inline constexpr std::size_t metric_samples = 256;
+// The second moments of the pose vectors of clips, over all frames.
+[[nodiscard]] Eigen::MatrixXd pose_moments(std::span<const PoseVectors> vectors, int dimensions);
+// The mean metric of 256 poses evenly over all clips; vectors[c] are those of clips[c].
+[[nodiscard]] PoseMetric mean_pose_metric(std::span<const Clip> clips, std::span<const PoseVectors> vectors,
+                                          const ReferencePose& reference);
 
 }  // namespace kinespace

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "kinespace/kernels/simd.h"
+#include "kinespace/motion/sine_cosine.h"
 
 namespace kinespace {
 namespace {
@@ -117,20 +118,8 @@ void fixed_sin_cos(double x, double& sine, double& cosine) noexcept {
                                     : -static_cast<double>(static_cast<long long>(0.5 - turns));
   // pi / 2 in two parts, so that whole turns take nothing off the small digits.
   const double r = (x - nearest * 1.57079632673412561417e+00) - nearest * 6.07710050650619224932e-11;
-  const double z = r * r;
-  const double s = r + r * z *
-                           (-1.66666666666666324348e-01 +
-                            z * (8.33333333332248946124e-03 +
-                                 z * (-1.98412698298579493134e-04 +
-                                      z * (2.75573137070700676789e-06 +
-                                           z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
-  const double c = 1 - z / 2 +
-                   z * z *
-                       (4.16666666666666019037e-02 +
-                        z * (-1.38888888888741095749e-03 +
-                             z * (2.48015872894767294178e-05 +
-                                  z * (-2.75573143513906633035e-07 +
-                                       z * (2.08757232129817482790e-09 - z * 1.13596475577881948265e-11)))));
+  double s = 0, c = 0;
+  sine_and_cosine_near_zero(r, s, c);
   switch (static_cast<long long>(nearest) & 3) {
     case 0:
       sine = s, cosine = c;

@@ -50,8 +50,8 @@ PoseSpaceEncoder::PoseSpaceEncoder(std::span<const Clip> clips, const Progress& 
     reference_ = reference_pose(clips);
   }
   take_vectors();
-  add_moments();
-  add_metrics();
+  moments_ = pose_moments(vectors_, reference_.dimensions());
+  metrics_ = mean_pose_metric(clips_, vectors_, reference_);
 }
 
 void PoseSpaceEncoder::take_vectors() {
@@ -62,40 +62,6 @@ void PoseSpaceEncoder::take_vectors() {
     table_.clips[c].placement = vectors_[c].placement;
     table_.clips[c].side_tracks = std::move(vectors_[c].side_tracks);
   });
-}
-
-void PoseSpaceEncoder::add_moments() {
-  const int d = reference_.dimensions();
-  std::vector<Eigen::MatrixXd> parts(vectors_.size());
-  tbb::parallel_for(std::size_t{0}, vectors_.size(), [&](std::size_t c) {
-    const PoseCurves x = pose_curves(vectors_[c], d);
-    parts[c] = Eigen::MatrixXd::Zero(d, d);
-    parts[c].selfadjointView<Eigen::Lower>().rankUpdate(x);
-  });
-  moments_ = Eigen::MatrixXd::Zero(d, d);
-  for (const Eigen::MatrixXd& part : parts) moments_ += part;
-  moments_ = Eigen::MatrixXd(moments_.selfadjointView<Eigen::Lower>()) / static_cast<double>(frames_);
-}
-
-void PoseSpaceEncoder::add_metrics() {
-  const int d = reference_.dimensions();
-  const std::int64_t samples = std::min<std::int64_t>(frames_, metric_samples);
-  std::vector<PoseMetric> parts(static_cast<std::size_t>(samples));
-  std::vector<std::int64_t> first{0};
-  for (const PoseVectors& v : vectors_) first.push_back(first.back() + v.frames);
-  tbb::parallel_for(std::int64_t{0}, samples, [&](std::int64_t s) {
-    const std::int64_t frame = (2 * s + 1) * frames_ / (2 * samples);
-    const auto c = static_cast<std::size_t>(std::ranges::upper_bound(first, frame) - first.begin()) - 1;
-    const Eigen::VectorXd pose = pose_curves(vectors_[c], d).col(frame - first[c]);
-    const Skeleton& skeleton = table_.skeletons[static_cast<std::size_t>(table_.clips[c].skeleton)];
-    parts[static_cast<std::size_t>(s)] =
-        pose_metric(skeleton, reference_, std::span(pose.data(), static_cast<std::size_t>(d)));
-  });
-  metrics_ = {Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd::Zero(d, d)};
-  for (const PoseMetric& part : parts) {
-    metrics_.positions += part.positions / static_cast<double>(samples);
-    metrics_.shell += part.shell / static_cast<double>(samples);
-  }
 }
 
 void PoseSpaceEncoder::plan(double step, const PoseSpaceSettings& settings) {

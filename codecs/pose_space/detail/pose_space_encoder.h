@@ -62,8 +62,6 @@ class PoseSpaceEncoder {
   using Coefficients = Eigen::Map<const RowMatrix, 0, Eigen::OuterStride<>>;
 
   void take_vectors();
-  void add_moments();
-  void add_metrics();
   void cut(std::size_t clip, double step, const PoseSpaceSettings& settings);
   void weigh(double shell_weight);
   void transform();

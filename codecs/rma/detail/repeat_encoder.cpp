@@ -59,35 +59,9 @@ RepeatEncoder::RepeatEncoder(std::span<const Clip> clips, const Preparation& pre
 
 // Moments of the pose vectors and the metric, and with them the exact basis.
 void RepeatEncoder::add_statistics() {
-  const int d = aligned_.reference.dimensions();
-  std::vector<Eigen::MatrixXd> moments(clips_.size());
-  std::vector<std::int64_t> first{0};
-  for (const PoseVectors& v : aligned_.vectors) first.push_back(first.back() + v.frames);
-  const std::int64_t frames = first.back();
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
-    moments[c] = Eigen::MatrixXd::Zero(d, d);
-    moments[c].selfadjointView<Eigen::Lower>().rankUpdate(pose_curves(aligned_.vectors[c], d));
-  });
-  Eigen::MatrixXd total = Eigen::MatrixXd::Zero(d, d);
-  for (const Eigen::MatrixXd& one : moments) total += one;
-  total = Eigen::MatrixXd(total.selfadjointView<Eigen::Lower>()) / static_cast<double>(frames);
-
-  const std::int64_t samples = std::min<std::int64_t>(frames, metric_samples);
-  std::vector<PoseMetric> metrics(static_cast<std::size_t>(samples));
-  tbb::parallel_for(std::int64_t{0}, samples, [&](std::int64_t s) {
-    const std::int64_t frame = (2 * s + 1) * frames / (2 * samples);
-    const auto c = static_cast<std::size_t>(std::ranges::upper_bound(first, frame) - first.begin()) - 1;
-    const Eigen::VectorXd pose = pose_curves(aligned_.vectors[c], d).col(frame - first[c]);
-    metrics[static_cast<std::size_t>(s)] =
-        pose_metric(clips_[c].skeleton, aligned_.reference, std::span(pose.data(), static_cast<std::size_t>(d)));
-  });
-  PoseMetric mean{Eigen::MatrixXd::Zero(d, d), Eigen::MatrixXd::Zero(d, d)};
-  for (const PoseMetric& one : metrics) {
-    mean.positions += one.positions / static_cast<double>(samples);
-    mean.shell += one.shell / static_cast<double>(samples);
-  }
+  const PoseMetric mean = mean_pose_metric(clips_, aligned_.vectors, aligned_.reference);
   metric_ = mean.combined(preparation_.shell_weight);
-  exact_ = karhunen_loeve(metric_, total);
+  exact_ = karhunen_loeve(metric_, pose_moments(aligned_.vectors, aligned_.reference.dimensions()));
 }
 
 void RepeatEncoder::cut(std::size_t clip, double step) {
