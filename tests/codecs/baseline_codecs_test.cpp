@@ -1,4 +1,5 @@
 // The codecs that papers compare with: what each promises. Damage is in codec_damage_test.cpp, for all codecs.
+#include <cmath>
 #include <map>
 
 #include <gtest/gtest.h>
@@ -62,7 +63,7 @@ TEST_P(BaselineCodec, finer_settings_of_its_own_lower_the_error_and_cost_bytes) 
   double last_error = 1e30;
   std::size_t last_size = 0;
   for (const double factor : {1.0, 2.0, 4.0}) {
-    const double value = more_is_finer ? 0.7 * own.initial * factor : own.initial / factor;
+    const double value = more_is_finer ? std::floor(0.7 * own.initial * factor) : own.initial / factor;
     const Bytes stream = encode(GetParam(), clips, {.settings = {{std::string(own.name), value}}});
     const std::vector<Clip> decoded = open_stream(stream, "s")->decode_all();
     const double error = test::error_of(clips, decoded).mean_cm();
