@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -118,7 +119,7 @@ Bytes encode_draco_frames(const MeshSequence& mesh, const MeshCodecOptions& opti
                                    .expected = fmt::format("at most {}", most_frames)});
   }
   const auto triangles = canonical_triangles(mesh.triangles);
-  const double size = std::max(diagonal(mesh), 1e-12);
+  const double size = std::max(diagonal(mesh), double{std::numeric_limits<float>::min()});
   Grid grid = grid_over(mesh, size / 1000);
   const double least = size * 1e-8;
   double step = 0;
@@ -136,7 +137,13 @@ Bytes encode_draco_frames(const MeshSequence& mesh, const MeshCodecOptions& opti
       grid.step = at;
       return error_on(mesh, grid, options.progress);
     };
-    step = largest_step(size / 500, least, options.kg.value_or(0.5), 0.01, 14, error);
+    const double kg = options.kg.value_or(MeshCodecOptions::usual_kg);
+    step = largest_step(size / 500, least, kg, 0.01, 14, error);
+    const double reached = step > 0 ? 0 : error(least);
+    if (reached > kg) {
+      throw Error(ErrorKind::usage, {.found = fmt::format("a kg of {} percent", kg),
+                                     .expected = fmt::format("{:.4g} or more for this sequence", reached)});
+    }
   }
   grid.step = step > 0 ? step : least;
   Bytes out = step > 0 || !options.bytes ? stream_on(mesh, triangles, grid, options.progress) : Bytes();

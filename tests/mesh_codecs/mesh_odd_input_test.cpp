@@ -137,6 +137,20 @@ TEST_P(OddMesh, a_mesh_that_is_one_point_is_kept) {
   for (std::size_t i = 0; i < 6; ++i) EXPECT_NEAR(back.positions[i], point.positions[i], 1e-4);
 }
 
+// What is told of the error is so, in millionths of a hair and in kilometres; else it is an error of the call.
+TEST_P(OddMesh, a_mesh_of_any_size_is_kept_or_refused) {
+  for (const float scale : {1e-30F, 1e-15F, 1e-6F, 1e6F}) {
+    MeshSequence mesh = small_tube();
+    for (float& x : mesh.positions) x *= scale;
+    try {
+      expect_kept(mesh);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::usage) << scale << ": " << error.what();
+      EXPECT_LT(scale, 1e-20F) << error.what();
+    }
+  }
+}
+
 TEST_P(OddMesh, numbers_that_are_not_finite_are_refused_by_frame_and_vertex) {
   for (const float number : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
     MeshSequence mesh = small_tube();
