@@ -51,6 +51,7 @@ std::vector<std::span<const std::byte>> unpack_parts(std::span<const std::byte> 
   std::vector<std::size_t> sizes;
   for (std::size_t i = 0; i < count; ++i) sizes.push_back(get_count(in, 1, what));
   std::vector<std::span<const std::byte>> out;
+  out.reserve(sizes.size());
   for (const std::size_t size : sizes) out.push_back(in.take(size));
   in.expect_end();
   return out;
