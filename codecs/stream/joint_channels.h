@@ -85,10 +85,11 @@ struct ChannelCurves {
   int frames = 0;
   std::vector<double> values;  // [channel][frame]; cm and degrees
 
-  [[nodiscard]] std::span<const double> channel(int c) const {
+  [[nodiscard]] std::span<const double> channel(int c) const& {
     return {values.data() + static_cast<std::size_t>(c) * static_cast<std::size_t>(frames),
             static_cast<std::size_t>(frames)};
   }
+  std::span<const double> channel(int c) const&& = delete;  // of what is gone with the statement
 };
 
 // The channels of a clip whose joints move as the layout says (what else they do is lost). Throws Error{bad_input} when

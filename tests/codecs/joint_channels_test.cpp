@@ -110,8 +110,8 @@ TEST(JointChannels, a_hinge_about_any_axis_has_one_channel) {
     EXPECT_EQ(layout.joints[1].turns, 1) << swing;
     EXPECT_EQ(layout.channel_count(), 7);
     EXPECT_LT(largest_turn_apart(clip, round_trip(clip, layout)), 1e-3);
-    const auto channel = channel_curves(clip, layout).channel(6);
-    const auto [least, most] = std::ranges::minmax(channel);
+    const ChannelCurves curves = channel_curves(clip, layout);
+    const auto [least, most] = std::ranges::minmax(curves.channel(6));
     const auto expected = std::ranges::minmax(RandomJoints(7).curve(200, 1));
     EXPECT_GT(most - least, 1.5 * swing * (expected.max - expected.min) / 4);
   }
