@@ -1,5 +1,6 @@
 #include "kinespace/codecs/registry.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -25,10 +26,33 @@ void check_settings(const Codec& codec, const CodecOptions& options) {
   }
 }
 
+// Before any codec computes with them: angles and rounded steps of what is no number have no meaning.
+void require_numbers(const Clip& clip) {
+  const auto refuse = [&](int joint, std::size_t frame) {
+    const std::string& name = clip.skeleton.joints[static_cast<std::size_t>(joint)].name;
+    throw Error(ErrorKind::bad_input, {.file = clip.name,
+                                       .found = fmt::format("no number at joint {} in frame {}", name, frame + 1),
+                                       .expected = "finite rotations and positions"});
+  };
+  const auto finite = [](double x) { return std::isfinite(x); };
+  for (int j = 0; j < clip.skeleton.joint_count(); ++j) {
+    const std::span<const double> track = clip.rotation_track(j);
+    const auto bad = std::ranges::find_if_not(track, finite);
+    if (bad != track.end()) refuse(j, static_cast<std::size_t>(bad - track.begin()) / 4);
+  }
+  for (const Clip::TranslationTrack& track : clip.translations) {
+    const auto bad = std::ranges::find_if_not(track.values, [](const auto& at) { return at.allFinite(); });
+    if (bad != track.values.end()) refuse(track.joint, static_cast<std::size_t>(bad - track.values.begin()));
+  }
+}
+
 void check_clips(std::span<const Clip> clips) {
   if (clips.empty()) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "at least one"});
   for (const Clip& clip : clips) {
-    if (clip.frames >= 1 && clip.rate_hz > 0 && std::isfinite(clip.rate_hz)) continue;
+    if (clip.frames >= 1 && clip.rate_hz > 0 && std::isfinite(clip.rate_hz)) {
+      require_numbers(clip);
+      continue;
+    }
     throw Error(ErrorKind::bad_input, {.file = clip.name,
                                        .found = fmt::format("{} frames at {} Hz", clip.frames, clip.rate_hz),
                                        .expected = "at least one frame and a rate above 0"});

@@ -1,6 +1,8 @@
 // What every codec owes the one who opens a stream: clips, or an error that names the file, for any bytes at all.
 #include <cmath>
+#include <limits>
 #include <map>
+#include <tuple>
 
 #include <gtest/gtest.h>
 
@@ -121,14 +123,20 @@ TEST_P(CodecDamage, targets_that_cannot_be_met_are_refused) {
   }
 }
 
-TEST_P(CodecDamage, clips_that_are_no_motion_are_refused) {
-  Clip clip = slice(test::sample_clips().front(), 0, 30);
-  clip.rotations[17] = std::numeric_limits<double>::quiet_NaN();
-  try {
-    static_cast<void>(encode(*GetParam(), std::span(&clip, 1)));
-    ADD_FAILURE() << "NaN was encoded";
-  } catch (const Error& error) {
-    EXPECT_EQ(error.kind(), ErrorKind::bad_input) << error.what();
+TEST_P(CodecDamage, clips_that_are_no_motion_are_refused_by_joint_and_frame) {
+  const Clip sound = slice(test::sample_clips().front(), 0, 30);
+  Clip turned = sound, moved = sound;
+  turned.rotation_track(3)[4 * 17] = std::numeric_limits<double>::quiet_NaN();
+  moved.require_translation_track(0).values[5].y() = std::numeric_limits<double>::infinity();
+  for (const auto& [clip, joint, frame] : {std::tuple{&turned, 3, "frame 18"}, {&moved, 0, "frame 6"}}) {
+    try {
+      static_cast<void>(encode(*GetParam(), std::span(clip, 1)));
+      ADD_FAILURE() << "what is no number was encoded";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::bad_input) << error.what();
+      const std::string& name = sound.skeleton.joints[static_cast<std::size_t>(joint)].name;
+      EXPECT_NE(std::string(error.what()).find(name + " in " + frame), std::string::npos) << error.what();
+    }
   }
 }
 
