@@ -30,7 +30,11 @@ constexpr std::array clip_pca_settings{
 class ClipPcaEncoder {
  public:
   ClipPcaEncoder(std::span<const Clip> clips, double variance, double root_cm, bool contacts, const Progress& progress)
-      : clips_(clips), progress_(progress), aligned_(align_clips(clips)), table_(marker_clip_table(clips, aligned_)) {
+      : clips_(clips),
+        progress_(progress),
+        aligned_(align_clips(clips)),
+        table_(marker_clip_table(clips, aligned_)),
+        packed_clips_(pack_clip_table(table_)) {
     const double rate = aligned_.rate_hz;
     const double seconds = rate >= 60 ? 0.2 : 0.533;
     length_ = static_cast<int>(std::clamp(std::round(seconds * rate), 4.0, 512.0));
@@ -78,13 +82,12 @@ class ClipPcaEncoder {
     });
     ClipErrorSums sums;
     for (const ClipErrorSums& part : parts) sums.add(part);
-    const Bytes table = pack_clip_table(table_);
     const Bytes motion = pack_clip_pca(stream);
     BitstreamWriter out(stream_kind("clip-pca"));
     out.set_error(sums.measured());
-    out.add_section("clips", table);
+    out.add_section("clips", packed_clips_);
     out.add_section("motion", motion);
-    add_padding(out, table.size() + motion.size(), table_.frames(), numbers_in(stream));
+    add_padding(out, packed_clips_.size() + motion.size(), table_.frames(), numbers_in(stream));
     return {out.finish(), sums.measured()};
   }
 
@@ -160,6 +163,7 @@ class ClipPcaEncoder {
   const Progress& progress_;
   AlignedClips aligned_;
   ClipTable table_;
+  Bytes packed_clips_;
   int length_ = 24;
   int root_span_ = 24;
   std::vector<RootCode> roots_;

@@ -41,15 +41,6 @@ Eigen::MatrixXd half_fit(const NaturalFunctions& functions, int parity) {
 // The windows' lengths in grid steps that are tried; a window of m steps begins at multiples of about m / 4.
 constexpr std::array<int, 12> tried{1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32};
 
-double bits_of(std::span<const double> coefficients) {
-  double out = 0;
-  for (const double c : coefficients) {
-    const double size = std::abs(c);
-    if (size > 0.5) out += 1.5 * std::log2(1 + size);
-  }
-  return out;
-}
-
 // One stretch without jumps.
 class StretchPlan {
  public:
@@ -95,7 +86,7 @@ class StretchPlan {
     const WindowTransform& transform = transform_for(length, functions);
     coefficients_.resize(static_cast<std::size_t>(curve_count_) * static_cast<std::size_t>(functions));
     transform.analyse(curves_.data() + first, frames_, curve_count_, coefficients_.data());
-    return options_.window_bits + bits_of(coefficients_);
+    return options_.window_bits + bits_of(coefficients_, 1);
   }
   const WindowTransform& transform_for(int length, int functions) {
     const auto found = transforms_.find(length);
@@ -178,6 +169,15 @@ void WindowTransform::analyse(const double* curves, std::ptrdiff_t stride, int c
     for (Eigen::Index k = 0; k < evens; ++k) target[2 * k] = even(c, k);
     for (Eigen::Index k = 0; k < odds; ++k) target[2 * k + 1] = odd(c, k);
   }
+}
+
+double bits_of(std::span<const double> coefficients, double step) {
+  double out = 0;
+  for (const double c : coefficients) {
+    const double size = std::abs(c) / step;
+    if (size > 0.5) out += 1.5 * std::log2(1 + size);
+  }
+  return out;
 }
 
 }  // namespace kinespace

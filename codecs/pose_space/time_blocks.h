@@ -51,4 +51,7 @@ class WindowTransform {
 // Components that windows are planned by: nearly all of the energy.
 inline constexpr int planned_components = 16;
 
+// About how many bits coefficients take at a quantiser step.
+[[nodiscard]] double bits_of(std::span<const double> coefficients, double step);
+
 }  // namespace kinespace

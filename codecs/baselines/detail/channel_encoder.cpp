@@ -66,7 +66,11 @@ struct ChannelEncoder::Coded {
 
 ChannelEncoder::ChannelEncoder(const ChannelTransform& transform, std::span<const Clip> clips,
                                const ChannelSearch& search, const Progress& progress)
-    : transform_(transform), clips_(clips), progress_(progress), table_(clip_table_of(clips)) {
+    : transform_(transform),
+      clips_(clips),
+      progress_(progress),
+      table_(clip_table_of(clips)),
+      packed_clips_(pack_clip_table(table_)) {
   prepare(search);
 }
 
@@ -187,13 +191,12 @@ CodedAttempt ChannelEncoder::encode(const Quality& quality, double rate_weight) 
 Bytes ChannelEncoder::write(const Coded& coded, const MeasuredError& error) const {
   BitstreamWriter out(stream_kind(transform_.name()));
   out.set_error(error);
-  Bytes clips = pack_clip_table(table_);
   Bytes tables = pack_channel_tables(coded.tables);
   std::vector<Bytes> codes;
   for (const PieceCode& piece : coded.pieces) codes.push_back(pack_piece(piece));
   Bytes pieces = pack_parts(codes);
-  const std::size_t size = clips.size() + tables.size() + pieces.size();
-  out.add_section("clips", std::move(clips));
+  const std::size_t size = packed_clips_.size() + tables.size() + pieces.size();
+  out.add_section("clips", packed_clips_);
   out.add_section("tables", std::move(tables));
   out.add_section("pieces", std::move(pieces));
   add_padding(out, size, table_.frames());

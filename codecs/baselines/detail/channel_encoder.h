@@ -33,6 +33,7 @@ class ChannelEncoder {
   std::span<const Clip> clips_;
   const Progress& progress_;
   ClipTable table_;
+  Bytes packed_clips_;
   std::vector<PiecePlace> places_;
   ChannelTables tables_;  // layout and weights
   std::vector<ChannelPiece> pieces_;

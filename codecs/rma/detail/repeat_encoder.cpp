@@ -20,15 +20,6 @@ namespace {
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-double bits_of(std::span<const double> coefficients, double step) {
-  double out = 0;
-  for (const double c : coefficients) {
-    const double size = std::abs(c) / step;
-    if (size > 0.5) out += 1.5 * std::log2(1 + size);
-  }
-  return out;
-}
-
 // Functions above this frequency are not looked at: nothing is left of them at such a step.
 int functions_for(int points, double rate_hz, double step) {
   const double highest_hz = step > 4 ? 12 : step > 1 ? 25 : 1e9;
