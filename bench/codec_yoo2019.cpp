@@ -31,7 +31,7 @@ struct EncodedFile {
 
 struct VectorSpace {
   std::vector<EncodedFile> files;
-  std::optional<MotionSpace> space;
+  std::optional<RegisteredSpace> space;
   // Of all sequences: squared norms left after so many functions, ours, Fourier's, Legendre's.
   std::array<std::vector<double>, 3> left;
   double curves = 0;  // in all sequences
@@ -69,14 +69,16 @@ VectorSpace analyse(const std::filesystem::path& folder) {
   VectorSpace out;
   for (const auto& file : find_motion_files({folder})) {
     out.files.push_back({.clip = read_clip(file), .encoded = {}});
-    prepared.push_back(prepare(out.files.back().clip));
+    prepared.push_back(prepare(out.files.back().clip, {.most_cycles = 0}));
   }
+  // The paper's own space: no ends apart, all motion cut at rests.
   SpaceBuildOptions options;
+  options.space.pinned = false;
   options.space.functions = most_functions;
   BuiltSpace built = build_space(source_of(prepared), options);
-  const AnalyticBasis fourier(AnalyticFamily::fourier, built.space.points(), built.space.points());
-  const AnalyticBasis legendre(AnalyticFamily::legendre, built.space.points(), built.space.points());
-  const FunctionGroup& group = built.space.groups().front();
+  const AnalyticBasis fourier(AnalyticFamily::fourier, built.space.plain().points(), built.space.plain().points());
+  const AnalyticBasis legendre(AnalyticFamily::legendre, built.space.plain().points(), built.space.plain().points());
+  const FunctionGroup& group = built.space.plain().groups().front();
   for (std::size_t i = 0; i < prepared.size(); ++i) {
     ClipCurves curves = prepared[i].curves;
     built.space.apply_references(curves.values);
@@ -85,7 +87,7 @@ VectorSpace analyse(const std::filesystem::path& folder) {
       const RunSampler sampler(curves.values, prepared[i].runs[r], curves.rate_hz);
       for (const EncodedSequence& sequence : out.files[i].encoded.runs[r].sequences) {
         const CurveMatrix rows =
-            sampler.sample(sequence.first, sequence.last, sequence.warp, built.space.points()).transpose();
+            sampler.sample(sequence.first, sequence.last, sequence.warp, built.space.plain().points()).transpose();
         const CurveMatrix centred = rows.rowwise() - group.mean.transpose();
         const auto energy = [&](const CurveMatrix& m) { return (m.cwiseAbs2() * fourier.weights()).sum(); };
         take_off(sequence.scores.transpose().cast<double>(), energy(centred), out.left[0]);
@@ -134,7 +136,7 @@ void add_figure_9(const std::string& name, const VectorSpace& data, BenchReport&
       const auto needed = std::ranges::find_if(left, [&](double e) { return e <= error; }) - left.begin();
       return raw / (4 * std::max(1.0, static_cast<double>(needed)) * data.curves);
     };
-    const std::array<double, 4> ratios{raw / (4 * numbers), raw / (4 * (numbers + (n + 1.0) * data.space->points())),
+    const std::array<double, 4> ratios{raw / (4 * numbers), raw / (4 * (numbers + (n + 1.0) * data.space->plain().points())),
                                        analytic(data.left[1]), analytic(data.left[2])};
     table.rows.push_back({static_cast<double>(n), ratios[0], ratios[1], ratios[2], ratios[3],
                           std::sqrt(std::max(error, 0.0) / data.curves)});

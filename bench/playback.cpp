@@ -28,7 +28,7 @@ constexpr int poses = 10000;
 constexpr int rounds = 100;  // the least counts: another program may be in the way
 
 struct Played {
-  MotionSpace space;
+  RegisteredSpace space;
   std::vector<EncodedClip> clips;
   std::vector<Player> players;
 };
@@ -116,7 +116,7 @@ BenchReport bench_playback(const BenchOptions& options) {
       return played.players[m.player].pose(m.time_s, functions, rotations).x();
     });
     // ACL decodes a pose in 0.25 to 0.5 microseconds.
-    add(functions < 0 ? fmt::format("a pose at all {} functions", played.space.functions())
+    add(functions < 0 ? fmt::format("a pose at all {} functions", played.space.levels())
                       : fmt::format("a pose at {} functions", functions),
         cost, "us", functions == 5 ? std::optional(0.5) : std::nullopt);
   }
@@ -133,7 +133,7 @@ BenchReport bench_playback(const BenchOptions& options) {
           [&](const Moment& m) { return reference::pose(played.players[m.player], m.time_s, 5, rotations).x(); }),
       "us");
   for (const int functions : {5, -1}) {
-    add(fmt::format("root against decoding, {} functions", functions < 0 ? played.space.functions() : functions),
+    add(fmt::format("root against decoding, {} functions", functions < 0 ? played.space.levels() : functions),
         difference_cm(played, functions), "cm", 0.01);
   }
   return report;

@@ -56,7 +56,7 @@ struct ClipFigures {
   std::vector<float> other_changes;
 };
 
-ClipFigures measure(const MotionSpace& space, const Clip& clip, const EncodedClip& encoded, int n) {
+ClipFigures measure(const RegisteredSpace& space, const Clip& clip, const EncodedClip& encoded, int n) {
   const JointPositions original = joint_positions(clip);
   const JointPositions decoded = joint_positions(clip_from_curves(decode(space, encoded, n), clip.skeleton));
   ClipFigures out;
@@ -95,7 +95,7 @@ struct Figures {
   double jump_ratio = 0;
 };
 
-Figures measure(const DataSet& data, const MotionSpace& space, const std::vector<EncodedClip>& encoded, int n) {
+Figures measure(const DataSet& data, const RegisteredSpace& space, const std::vector<EncodedClip>& encoded, int n) {
   std::vector<ClipFigures> parts(data.clips.size());
   tbb::parallel_for(std::size_t{0}, parts.size(),
                     [&](std::size_t i) { parts[i] = measure(space, data.clips[i], encoded[i], n); });

@@ -35,9 +35,13 @@ Json to_json(const LibraryReport& report, const std::filesystem::path& output, d
           {"spaces", report.spaces},
           {"functions", report.functions},
           {"variance", report.variance},
+          {"movement", report.movement},
           {"mean_joint_error_cm", report.mean_joint_error_cm},
           {"max_joint_error_cm", report.max_joint_error_cm},
           {"frames", report.frames},
+          {"cycles", report.cycles},
+          {"cyclic_share", report.seconds > 0 ? report.cyclic_seconds / report.seconds : 0},
+          {"warped", report.warped},
           {"bytes", report.bytes},
           {"seconds", seconds}};
 }
@@ -62,6 +66,7 @@ void run_build(BuildOptions options, Session& session) {
   const auto start = std::chrono::steady_clock::now();
   LibraryBuilderOptions& library = options.library;
   library.space.align = !options.no_align;
+  library.space.sequences.equal_windows = options.no_align;
   library.space.space.grouping = grouping_of(options.grouping);
   if (options.functions > 0) library.space.space.functions = options.functions;
   if (!options.asf.empty()) library.asf = options.asf;
@@ -101,7 +106,13 @@ void add_build(CLI::App& app, Session& session) {
       ->check(CLI::IsMember({"all", "component", "joint"}))
       ->capture_default_str();
   command->add_flag("--smooth", library.space.space.smooth, "Smooth mean and covariance and take noise off (PACE)");
-  command->add_flag("--no-align", options->no_align, "Leave the timing of sequences as it is");
+  command
+      ->add_option("--cycles", library.space.sequences.most_cycles,
+                   "Most cycles of a walk or the like in a sequence (0: cut all motion at rests)")
+      ->check(CLI::Range(0, 8))
+      ->capture_default_str();
+  command->add_flag("--no-align", options->no_align,
+                    "As many sequences, but of equal length at any phase, and no warps: what registration is worth");
   command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
   command->add_flag("--json", options->json, "Print the result as one JSON object");
   session.files.reads(command, {"CLIPS", "--asf"});

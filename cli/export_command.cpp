@@ -23,15 +23,12 @@ struct ExportOptions {
   bool json = false;
 };
 
-// A bound looser than this says nothing about a person's motion.
-constexpr double loosest_bound_cm = 10;
-
 void run_export(const ExportOptions& options, Session& session) {
   static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
   LibraryView library(options.library);
   const ClipRow row = library.require_clip(options.clip);
-  const MotionSpace& space = library.space(row.space_id);
-  int functions = space.functions();
+  const RegisteredSpace& space = library.space(row.space_id);
+  int functions = space.levels();
   if (options.functions) functions = std::min(*options.functions, functions);
   std::optional<LibraryView::LevelOfDetail> level;
   if (options.max_error_cm) {
@@ -48,16 +45,8 @@ void run_export(const ExportOptions& options, Session& session) {
               {"output", options.output.string()},
               {"frames", row.frames},
               {"functions", functions},
-              {"of_functions", space.functions()}};
+              {"of_functions", space.levels()}};
   if (level) result["max_joint_error_cm"] = level->max_error_cm;
-  const double bound_cm = truncation_bound_cm(space, skeleton, encoded, functions);
-  if (bound_cm <= loosest_bound_cm) {
-    result["rms_error_bound_cm"] = bound_cm;
-  } else if (options.json) {
-    result["rms_error_bound_cm"] = nullptr;
-    session.note(fmt::format("rms_error_bound_cm is null: above {} cm it says nothing; kinespace compare measures",
-                             loosest_bound_cm));
-  }
   options.json ? print_json(result) : print_fields(result);
 }
 

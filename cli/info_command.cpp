@@ -65,14 +65,27 @@ bool is_library(const std::filesystem::path& file) {
 }
 
 Json describe_space(LibraryView& view, const SpaceRow& row) {
-  const MotionSpace& space = view.space(row.id);
+  const RegisteredSpace& space = view.space(row.id);
+  Json sets = Json::array();
+  for (const MotionSpace& set : space.sets()) {
+    if (set.functions() == 0) continue;
+    sets.push_back({{"cycles", set.options().cycles},
+                    {"points", set.points()},
+                    {"functions", set.function_count()},
+                    {"variance", set.variance_covered()},
+                    {"movement", set.movement_covered()}});
+  }
   return {{"clips", 0},
           {"joints", space.skeleton().joint_count()},
           {"rotating_joints", space.layout().joint_count()},
           {"curves", space.curves()},
-          {"points", space.points()},
+          {"points", space.plain().points()},
           {"functions", space.function_count()},
-          {"variance", space.variance_covered()}};
+          {"levels", space.levels()},
+          {"variance", space.variance_covered()},
+          {"movement", space.movement_covered()},
+          {"warped", space.warped()},
+          {"sets", std::move(sets)}};
 }
 
 Json describe_library(const InfoOptions& options, Session& /*session*/) {

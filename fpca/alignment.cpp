@@ -33,6 +33,7 @@ void AlignmentOptions::validate() const {
 WarpSearch::WarpSearch(const MotionSpace& space, const AlignmentOptions& options)
     : options_(options),
       curves_(space.curves()),
+      pinned_(space.options().pinned),
       mean_(search_points),
       root_weight_(search_points),
       curve_weight_(curve_weights(space.skeleton()).cast<float>()) {
@@ -61,6 +62,8 @@ WarpSearch::Scratch WarpSearch::prepare(const RunSampler& run, int first, int la
   Scratch scratch;
   scratch.own =
       run.sample(first, last, Warp(), own_time_points).cast<float>().array().rowwise() * curve_weight_.array();
+  scratch.ends = Row::Zero(2, curves_);
+  if (pinned_) scratch.ends << scratch.own.topRows(1), scratch.own.bottomRows(1);
   scratch.projection.resize(functions_.cols(), curves_);
   scratch.row.resize(curves_);
   return scratch;
@@ -75,7 +78,9 @@ double WarpSearch::residual(Scratch& scratch, const Warp& warp) const {
     const auto k = std::min(static_cast<Eigen::Index>(x), static_cast<Eigen::Index>(own_time_points - 2));
     const auto b = static_cast<float>(x - static_cast<double>(k)) * root_weight_(i);
     const float a = root_weight_(i) - b;
-    scratch.row = a * scratch.own.row(k) + b * scratch.own.row(k + 1) - mean_(i) * curve_weight_;
+    const float to_last = static_cast<float>(s) * root_weight_(i);
+    scratch.row = a * scratch.own.row(k) + b * scratch.own.row(k + 1) - mean_(i) * curve_weight_ -
+                  (root_weight_(i) - to_last) * scratch.ends.row(0) - to_last * scratch.ends.row(1);
     total += static_cast<double>(scratch.row.squaredNorm());
     for (Eigen::Index f = 0; f < functions_.cols(); ++f) scratch.projection.row(f) += functions_(i, f) * scratch.row;
   }

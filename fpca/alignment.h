@@ -49,6 +49,7 @@ class WarpSearch {
   using Row = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
   struct Scratch {
     Row own;         // the sequence over its own time, finely
+    Row ends;        // 2 x C: what the line between the ends is drawn through; zeros where the space is not pinned
     Row projection;  // n x C
     Eigen::RowVectorXf row;
   };
@@ -58,6 +59,7 @@ class WarpSearch {
 
   AlignmentOptions options_;
   int curves_;
+  bool pinned_;
   Eigen::VectorXf mean_;     // at the search's points, times the root of their weight
   Eigen::Index coarse_ = 0;  // n
   Row functions_;            // [point][function], 2n of them, orthonormal columns under the plain dot product

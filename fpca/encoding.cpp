@@ -24,8 +24,9 @@ SampleMatrix integrate_travel(const SampleMatrix& samples, const Warp& warp, dou
   return UniformSpline(std::move(rate)).cumulative_integral();
 }
 
-SampleMatrix decode_frames(const MotionSpace& space, const EncodedSequence& sequence, const Eigen::Vector3d& start,
+SampleMatrix decode_frames(const RegisteredSpace& all_sets, const EncodedSequence& sequence, const Eigen::Vector3d& start,
                            double rate_hz, int n) {
+  const MotionSpace& space = all_sets.of(sequence.cycles);
   SampleMatrix samples = space.samples(sequence.scores, n);
   const int intervals = sequence.last - sequence.first;
   const Eigen::Vector3d travel = sequence.travel.cast<double>();
@@ -61,20 +62,6 @@ void join(SampleMatrix& frames, const CutCorrection* before, const CutCorrection
       frames.row(f) += w.value * after->value - (w.slope * steepness) * after->slope;
     }
   }
-}
-
-// Farthest that a point of joint `descendant` can be from joint `ancestor`, by bone lengths, in cm.
-double reach(const Skeleton& skeleton, int ancestor, int descendant) {
-  double sum = 0;
-  for (int j = descendant; j != ancestor; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
-    sum += skeleton.joints[static_cast<std::size_t>(j)].offset.norm();
-  }
-  return sum;
-}
-
-bool is_above(const Skeleton& skeleton, int ancestor, int joint) {
-  while (joint > ancestor) joint = skeleton.joints[static_cast<std::size_t>(joint)].parent;
-  return joint == ancestor;
 }
 
 }  // namespace
@@ -127,7 +114,7 @@ SampleMatrix RunSampler::sample(int first, int last, const Warp& warp, int point
   return out;
 }
 
-EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
+EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
                    const std::vector<Warp>& warps, const Compute& compute) {
   EncodedClip out{.name = curves.name,
                   .rate_hz = curves.rate_hz,
@@ -140,19 +127,19 @@ EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std
     EncodedRun& encoded = out.runs.emplace_back();
     encoded.start = curves.values.row(run.cuts.front()).head<3>().transpose().cast<float>();
     for (int i = 0; i < run.sequence_count(); ++i) {
-      EncodedSequence sequence{.first = run.first_frame(i), .last = run.last_frame(i)};
+      EncodedSequence sequence{.first = run.first_frame(i), .last = run.last_frame(i), .cycles = run.cycles_of(i)};
       if (!warps.empty()) sequence.warp = warps.at(warp++);
       sequence.travel =
           (curves.values.row(sequence.last) - curves.values.row(sequence.first)).head<3>().transpose().cast<float>();
-      sequence.scores =
-          space.scores(sampler.sample(sequence.first, sequence.last, sequence.warp, space.points()), compute);
+      const MotionSpace& set = space.of(sequence.cycles);
+      sequence.scores = set.scores(sampler.sample(sequence.first, sequence.last, sequence.warp, set.points()), compute);
       encoded.sequences.push_back(std::move(sequence));
     }
   }
   return out;
 }
 
-void decode_in_parts(const MotionSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
+void decode_in_parts(const RegisteredSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
                      const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit) {
   for (const EncodedRun& run : clip.runs) {
     // Two sequences at a time: positions of the root in metres from the clip's start, and quaternions.
@@ -176,7 +163,7 @@ void decode_in_parts(const MotionSpace& space, const EncodedClip& clip, int n, c
   }
 }
 
-ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n, const JoinOptions& options) {
+ClipCurves decode(const RegisteredSpace& space, const EncodedClip& clip, int n, const JoinOptions& options) {
   ClipCurves out{.name = clip.name,
                  .rate_hz = clip.rate_hz,
                  .placement = clip.placement,
@@ -188,52 +175,17 @@ ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n, cons
   return out;
 }
 
-EncodedClip encode_clip(const MotionSpace& space, const Clip& clip, const SequenceOptions& sequences) {
+EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip, const SequenceOptions& sequences) {
   if (!clip.skeleton.same_tree(space.skeleton())) {
     throw Error(ErrorKind::bad_input, {.file = clip.name,
                                        .found = "a skeleton that is not that of the motion space",
                                        .expected = "the same joint names, parents and channels"});
   }
   ClipCurves curves = clip_curves(clip);
+  const auto usable = [&space](int cycles) { return space.has(cycles); };
+  const std::vector<Run> runs = SequenceCutter(clip, sequences).cut(curves, clip.skeleton, usable);
   space.apply_references(curves.values);
-  return encode(space, curves, cut_sequences(clip, sequences));
-}
-
-double truncation_bound_cm(const MotionSpace& space, const Skeleton& skeleton, const EncodedClip& clip, int n) {
-  constexpr double cm_per_metre = 100;
-  const CurveLayout& layout = space.layout();
-  Eigen::VectorXd joint_error = Eigen::VectorXd::Zero(layout.joint_count());  // rms |q~ - q|, over the clip
-  double root_error = 0;
-  double time = 0;
-  for (const EncodedRun& run : clip.runs) {
-    for (const EncodedSequence& sequence : run.sequences) {
-      const double duration = std::max(1, sequence.last - sequence.first) / clip.rate_hz;
-      const Eigen::VectorXd error = space.truncation_error(sequence.scores, n);
-      // Own time runs at most twice as fast as the space's, so its mean square is at most twice as large.
-      const double stretch = sequence.warp.is_identity() ? 1 : 2;
-      for (int k = 0; k < layout.joint_count(); ++k) {
-        joint_error(k) += duration * stretch * error.segment<4>(3 + 4 * k).squaredNorm();
-      }
-      // |p(t)| <= integral |v|; both ends are exact, so the error grows over at most half the duration from either.
-      root_error += duration * stretch * error.head<3>().squaredNorm() * duration * duration;
-      time += duration;
-    }
-  }
-  if (time <= 0) return 0;
-  joint_error = (joint_error / time).cwiseSqrt();
-  root_error = cm_per_metre * std::sqrt(root_error / time);
-  double worst = root_error;
-  for (int j = 0; j < skeleton.joint_count(); ++j) {
-    double sum = root_error;
-    for (int k = 0; k < layout.joint_count(); ++k) {
-      const int above = layout.joints[static_cast<std::size_t>(k)];
-      if (above < j && is_above(skeleton, above, j)) {
-        sum += 2 * std::numbers::sqrt2 * joint_error(k) * reach(skeleton, above, j);
-      }
-    }
-    worst = std::max(worst, sum);
-  }
-  return worst;
+  return encode(space, curves, runs);
 }
 
 }  // namespace kinespace

@@ -1,7 +1,8 @@
 // A clip in a motion space: from its curves to the vectors of its sequences, and back at any level of detail.
 //
-// Sequences are independent in the space; on the way back they are joined so that nothing jumps at a cut: neighbours
-// meet at the mean of their two ends, and where the change of slope at the cut is larger than what the sequences show
+// Each sequence is described by the function set of its kind (fpca/registered_space.h), independently of the others; on
+// the way back they are joined so that nothing jumps at a cut: neighbours meet at the mean of their two ends (which are
+// equal where ends are kept), and where the change of slope at the cut is larger than what the sequences show
 // inside, the excess is taken out, both by corrections that fade within `blend` of a sequence.
 #pragma once
 
@@ -12,7 +13,7 @@
 
 #include <Eigen/Core>
 
-#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/registered_space.h"
 #include "kinespace/fpca/sequences.h"
 #include "kinespace/fpca/warp.h"
 #include "kinespace/motion/curves.h"
@@ -23,10 +24,11 @@ namespace kinespace {
 struct EncodedSequence {
   int first = 0;  // frames of the clip, both included
   int last = 0;
+  int cycles = 0;  // whole cycles that it holds; 0: it was cut at rests
   Warp warp;
   Eigen::Vector3f travel =
       Eigen::Vector3f::Zero();  // metres from the first to the last frame, heading 0 frame of the clip
-  ScoreMatrix scores;           // K x C
+  ScoreMatrix scores;           // MotionSpace::rows() x C, of the set of its cycles
 };
 
 struct EncodedRun {
@@ -78,27 +80,21 @@ class RunSampler {
 
 // `curves` must be on the space's side (MotionSpace::apply_references). One warp a sequence, in order; none:
 // identities.
-[[nodiscard]] EncodedClip encode(const MotionSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
+[[nodiscard]] EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
                                  const std::vector<Warp>& warps = {}, const Compute& compute = {});
 
-// With the first n functions (all when n < 0).
-[[nodiscard]] ClipCurves decode(const MotionSpace& space, const EncodedClip& clip, int n = -1,
+// At level of detail n (all when n < 0).
+[[nodiscard]] ClipCurves decode(const RegisteredSpace& space, const EncodedClip& clip, int n = -1,
                                 const JoinOptions& options = {});
 
 // The same, sequence by sequence, for what must not hold all of a long clip: hands over the first frame and the values
 // of the frames from there on (ClipCurves::values), every frame once, ascending.
-void decode_in_parts(const MotionSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
+void decode_in_parts(const RegisteredSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
                      const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit);
 
 // A clip outside the library, into the space: curves, sides, cuts, vectors. Throws Error{bad_input} for another
 // skeleton.
-[[nodiscard]] EncodedClip encode_clip(const MotionSpace& space, const Clip& clip,
+[[nodiscard]] EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip,
                                       const SequenceOptions& sequences = {});
-
-// Bounds the root mean square joint position error, in cm, that leaving out all but n functions makes in a sequence,
-// from the scores alone: rms |p~ - p| <= rms root error + sum over the joints above of 2 sqrt(2) rms |q~ - q| times the
-// distance below them that they swing. Joining at cuts is not in it. Largest over joints.
-[[nodiscard]] double truncation_bound_cm(const MotionSpace& space, const Skeleton& skeleton, const EncodedClip& clip,
-                                         int n);
 
 }  // namespace kinespace

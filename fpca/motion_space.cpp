@@ -38,6 +38,44 @@ void add_block(const CurveMatrix& block, const Compute& compute, CurveMoments& m
   moments.merge(CurveMoments(c.count, c.mean, c.covariance * static_cast<double>(c.count)));
 }
 
+// s at the points of the grid.
+Eigen::VectorXd times_of(int points) {
+  return Eigen::VectorXd::LinSpaced(points, 0, 1);
+}
+
+// The straight lines between the ends of curves, T x C.
+SampleMatrix lines_between_ends(const SampleMatrix& samples) {
+  const Eigen::VectorXd s = times_of(static_cast<int>(samples.rows()));
+  SampleMatrix out = s * (samples.bottomRows(1) - samples.topRows(1));
+  out.rowwise() += samples.row(0);
+  return out;
+}
+
+// Moments of what curves are above the lines between their ends. That is linear in the curves, B f with
+// B = I - (1 - s) e_0' - s e_T', so the moments of the curves themselves say it.
+CurveMoments above_the_lines(const CurveMoments& moments) {
+  const int points = moments.points();
+  const Eigen::VectorXd s = times_of(points);
+  Eigen::MatrixXd above = Eigen::MatrixXd::Identity(points, points);
+  above.col(0) -= Eigen::VectorXd::Ones(points) - s;
+  above.col(points - 1) -= s;
+  return {moments.count(), above * moments.mean(), above * moments.scatter() * above.transpose()};
+}
+
+// Mean over the curves of their mean square distance in time from their common mean.
+double variance_of(const CurveMoments& moments, const Eigen::VectorXd& weights) {
+  const auto divisor = static_cast<double>(std::max<std::int64_t>(1, moments.count() - 1));
+  return weights.dot(moments.scatter().diagonal()) / divisor;
+}
+
+// The same of each curve from its own mean in time: trace of W (I - 1 w') (S / n + m m') (I - w 1').
+double movement_of(const CurveMoments& moments, const Eigen::VectorXd& weights) {
+  if (moments.count() == 0) return 0;
+  const Eigen::MatrixXd second =
+      moments.scatter() / static_cast<double>(moments.count()) + moments.mean() * moments.mean().transpose();
+  return weights.dot(second.diagonal()) - weights.dot(second * weights);
+}
+
 }  // namespace
 
 void MotionSpaceOptions::validate() const {
@@ -50,6 +88,7 @@ void MotionSpaceOptions::validate() const {
     fail(fmt::format("variance_share = {}", variance_share), "a share above 0, up to 1");
   }
   if (functions && (*functions < 1 || *functions > 1024)) fail(fmt::format("functions = {}", *functions), "1 to 1024");
+  if (cycles < 0 || cycles > 8) fail(fmt::format("cycles = {}", cycles), "0 to 8");
 }
 
 MotionSpace::MotionSpace(Skeleton skeleton, MotionSpaceOptions options, int points)
@@ -136,55 +175,91 @@ void MotionSpace::fit(std::vector<CurveMoments> moments) {
   groups_.clear();
   FunctionalPcaWorkspace workspace(points_, fpca_options(options_));
   for (const CurveMoments& m : moments) {
-    FunctionalPca pca = workspace.fit(m);
-    FunctionGroup group;
-    group.mean = pca.observed_mean;
-    group.functions = pca.observed_functions;
-    group.eigenvalues = pca.eigenvalues;
-    group.variance = pca.all_eigenvalues.cwiseMax(0).sum();
-    groups_.push_back(std::move(group));
+    if (m.count() == 0) {
+      groups_.push_back({Eigen::VectorXd::Zero(points_), Eigen::MatrixXd(points_, 0), Eigen::VectorXd(), 0, 0});
+    } else if (options_.pinned) {
+      groups_.push_back(fit_pinned(m));
+    } else {
+      FunctionalPca pca = workspace.fit(m);
+      const double variance = pca.all_eigenvalues.cwiseMax(0).sum();
+      const double left = variance - pca.eigenvalues.sum();
+      groups_.push_back({pca.observed_mean, pca.observed_functions, pca.eigenvalues, variance, left});
+    }
   }
   moments_ = std::move(moments);
 }
 
+// The share of variance that is asked for is of the curves' own, of which the ends take most.
+FunctionGroup MotionSpace::fit_pinned(const CurveMoments& moments) const {
+  const CurveMoments above = above_the_lines(moments);
+  const double variance = variance_of(moments, weights_);
+  const double of_functions = variance_of(above, weights_);
+  const double may_be_left = (1 - options_.variance_share) * variance;
+  FpcaOptions options = fpca_options(options_);
+  if (!options.count && may_be_left >= of_functions) options.count = 0;
+  if (!options.count) options.variance_share = 1 - may_be_left / of_functions;
+  FunctionalPca pca = FunctionalPcaWorkspace(points_, options).fit(above);
+  const double left = pca.all_eigenvalues.cwiseMax(0).sum() - pca.eigenvalues.sum();
+  return {pca.observed_mean, pca.observed_functions, pca.eigenvalues, variance, left};
+}
+
 ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& compute) const {
   assert(samples.rows() == points_ && samples.cols() == curves());
-  ScoreMatrix out = ScoreMatrix::Zero(functions(), curves());
+  ScoreMatrix out = ScoreMatrix::Zero(rows(), curves());
+  SampleMatrix above;  // what functions describe, where it is not the samples themselves
+  if (options_.pinned) {
+    out.row(0) = samples.row(0).cast<float>();
+    out.row(1) = samples.row(points_ - 1).cast<float>();
+    above = samples - lines_between_ends(samples);
+  }
+  const SampleMatrix& curves_of = options_.pinned ? above : samples;
+  auto of_functions = out.bottomRows(functions());
   if (groups_.size() == 1) {
     const FunctionGroup& g = groups_.front();
     const Eigen::MatrixXd projector = (g.functions.array().colwise() * weights_.array()).matrix();
     const double flops = 2.0 * static_cast<double>(projector.size()) * curves();
     if (compute.device_for(KernelFamily::projection, flops) != nullptr) {
-      const RowMatrix<float> rows = samples.transpose().cast<float>();
+      const RowMatrix<float> curve_rows = curves_of.transpose().cast<float>();
       const RowMatrix<float> matrix = projector.cast<float>();
-      return project(rows, g.mean.cast<float>(), matrix, compute).transpose();
+      of_functions = project(curve_rows, g.mean.cast<float>(), matrix, compute).transpose();
+      return out;
     }
-    const SampleMatrix centred = samples.colwise() - g.mean;
-    out = (projector.transpose() * centred).cast<float>();
+    const SampleMatrix centred = curves_of.colwise() - g.mean;
+    of_functions = (projector.transpose() * centred).cast<float>();
     return out;
   }
   for (int c = 0; c < curves(); ++c) {
     const FunctionGroup& g = groups_[static_cast<std::size_t>(group_of(c))];
-    const Eigen::VectorXd weighted = (samples.col(c) - g.mean).cwiseProduct(weights_);
-    out.col(c).head(g.functions.cols()) = (g.functions.transpose() * weighted).cast<float>();
+    const Eigen::VectorXd weighted = (curves_of.col(c) - g.mean).cwiseProduct(weights_);
+    of_functions.col(c).head(g.functions.cols()) = (g.functions.transpose() * weighted).cast<float>();
   }
   return out;
 }
 
+void MotionSpace::add_ends(const ScoreMatrix& scores, SampleMatrix& samples) const {
+  const Eigen::RowVectorXd first = scores.row(0).cast<double>();
+  const Eigen::RowVectorXd change = scores.row(1).cast<double>() - first;
+  samples.noalias() += times_of(points_) * change;
+  samples.rowwise() += first;
+}
+
 SampleMatrix MotionSpace::samples(const ScoreMatrix& scores, int n) const {
-  if (n < 0 || n > functions()) n = functions();
+  const int ends = options_.pinned ? 2 : 0;
+  const int kept = rows_at(n);
+  const int of_functions = std::max(0, kept - ends);
+  SampleMatrix out(points_, curves());
   if (groups_.size() == 1) {
     const FunctionGroup& g = groups_.front();
-    SampleMatrix out = g.functions.leftCols(n) * scores.topRows(n).cast<double>();
+    out.noalias() = g.functions.leftCols(of_functions) * scores.middleRows(ends, of_functions).cast<double>();
     out.colwise() += g.mean;
-    return out;
+  } else {
+    for (int c = 0; c < curves(); ++c) {
+      const FunctionGroup& g = groups_[static_cast<std::size_t>(group_of(c))];
+      const Eigen::Index k = std::min<Eigen::Index>(of_functions, g.functions.cols());
+      out.col(c) = g.mean + g.functions.leftCols(k) * scores.col(c).segment(ends, k).cast<double>();
+    }
   }
-  SampleMatrix out(points_, curves());
-  for (int c = 0; c < curves(); ++c) {
-    const FunctionGroup& g = groups_[static_cast<std::size_t>(group_of(c))];
-    const Eigen::Index k = std::min<Eigen::Index>(n, g.functions.cols());
-    out.col(c) = g.mean + g.functions.leftCols(k) * scores.col(c).head(k).cast<double>();
-  }
+  if (options_.pinned && kept > 0) add_ends(scores, out);
   return out;
 }
 
@@ -194,7 +269,7 @@ ScoreMatrix MotionSpace::transfer(const ScoreMatrix& scores, const MotionSpace& 
 }
 
 Eigen::VectorXd MotionSpace::truncation_error(const ScoreMatrix& scores, int n) const {
-  const int rest = std::max(0, functions() - std::max(n, 0));
+  const int rest = rows() - rows_at(n);
   return scores.bottomRows(rest).cast<double>().colwise().norm().transpose();
 }
 
@@ -204,6 +279,23 @@ int MotionSpace::functions() const {
   return static_cast<int>(most);
 }
 
+int MotionSpace::rows() const {
+  return functions() + (options_.pinned ? 2 : 0);
+}
+
+int MotionSpace::rows_at(int n) const {
+  if (n < 0) return rows();
+  const std::int64_t numbers = std::int64_t{n} * std::max(1, options_.cycles);  // a curve
+  const std::int64_t wanted = options_.pinned ? std::max<std::int64_t>(2, numbers + 1) : numbers;
+  return static_cast<int>(std::min<std::int64_t>(rows(), wanted));
+}
+
+int MotionSpace::levels() const {
+  const int numbers = options_.pinned ? rows() - 1 : rows();
+  const int a_level = std::max(1, options_.cycles);
+  return (numbers + a_level - 1) / a_level;
+}
+
 int MotionSpace::function_count() const {
   Eigen::Index sum = 0;
   for (const FunctionGroup& g : groups_) sum += g.functions.cols();
@@ -211,13 +303,23 @@ int MotionSpace::function_count() const {
 }
 
 double MotionSpace::variance_covered() const {
-  double covered = 0;
+  double left = 0;
   double all = 0;
   for (const FunctionGroup& g : groups_) {
-    covered += g.eigenvalues.sum();
+    left += g.left;
     all += g.variance;
   }
-  return all > 0 ? covered / all : 1;
+  return all > 0 ? 1 - left / all : 1;
+}
+
+double MotionSpace::movement_covered() const {
+  double left = 0;
+  double all = 0;
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    left += groups_[g].left;
+    all += movement_of(moments_[g], weights_);
+  }
+  return all > 0 ? 1 - left / all : 1;
 }
 
 }  // namespace kinespace

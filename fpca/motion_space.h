@@ -8,6 +8,15 @@
 //
 // The vector of a sequence is all x_kc, function by function, most important first: its first n rows are the sequence
 // at a coarser level of detail, and by Parseval the L2 error of leaving the rest out is the norm of the rest.
+//
+// Orthonormal functions are free at the ends of a sequence, and there the first few of them err most. In a pinned space
+// the curves' values at both ends are kept as they are (a sequence shares them with its neighbours, so they cost one
+// number a curve), and functions describe what is left above the straight line between them:
+//
+//   f_c(s) = (1 - s) f_c(0) + s f_c(1) + mu_g(s) + sum_k  x_kc phi_gk(s),      mu_g, phi_gk = 0 at both ends
+//
+// Its vectors have the two ends as rows 0 and 1. Level of detail n of it takes n numbers a curve: the end, and the first
+// n - 1 functions; n for each cycle, where sequences hold several.
 #pragma once
 
 #include <cstdint>
@@ -39,6 +48,8 @@ struct MotionSpaceOptions {
   double variance_share = 0.999999;  // of the curves' variance that the functions cover, in (0, 1] ...
   std::optional<int> functions;      // ... or a count, 1 .. T
   bool smooth = false;  // smooth mean and covariance and take the noise off (PACE); clean motion needs none
+  bool pinned = false;  // the ends of sequences are kept apart
+  int cycles = 0;       // whole cycles that a sequence holds, 0 .. 8; 0: it is no cyclic motion
 
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;
@@ -49,7 +60,8 @@ class MotionSpace;
 [[nodiscard]] Bytes pack_space(const MotionSpace& space);
 [[nodiscard]] MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& source);
 
-// [function][curve]: row k holds x_kc. Groups with fewer functions have zeros in the rows they lack.
+// [function][curve]: row k holds x_kc, behind the two ends where the space is pinned. Groups with fewer functions have
+// zeros in the rows they lack.
 using ScoreMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 // The functions of one group of curves.
@@ -57,7 +69,8 @@ struct FunctionGroup {
   Eigen::VectorXd mean;         // T
   Eigen::MatrixXd functions;    // T x K, orthonormal under the trapezoid rule
   Eigen::VectorXd eigenvalues;  // K, descending
-  double variance = 0;          // of all T directions
+  double variance = 0;          // of the curves about their common mean
+  double left = 0;              // of it, what ends and functions do not reach
 };
 
 class MotionSpace {
@@ -80,16 +93,16 @@ class MotionSpace {
   // entry.
   void accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments,
                   const Compute& compute = {}) const;
-  // Finds the functions. The moments stay with the space, so that it can be extended.
+  // Finds the functions; none where there are no curves. The moments stay with the space, so that it can be extended.
   void fit(std::vector<CurveMoments> moments);
 
-  // T x C samples to K x C scores and back, with the first n functions (all when n < 0 or too large).
+  // T x C samples to scores (rows() x C) and back, at level of detail n (all when n < 0 or too large).
   [[nodiscard]] ScoreMatrix scores(const SampleMatrix& samples, const Compute& compute = {}) const;
   [[nodiscard]] SampleMatrix samples(const ScoreMatrix& scores, int n = -1) const;
   // Scores in this space of what the scores were in another one of the same grid and curves (after it was extended).
   [[nodiscard]] ScoreMatrix transfer(const ScoreMatrix& scores, const MotionSpace& from) const;
 
-  // Root mean square over the sequence's time of the error in each curve when only the first n functions are kept.
+  // Root mean square over the sequence's time of the error in each curve at level of detail n >= 1.
   [[nodiscard]] Eigen::VectorXd truncation_error(const ScoreMatrix& scores, int n) const;
 
   [[nodiscard]] const Skeleton& skeleton() const { return skeleton_; }
@@ -97,16 +110,24 @@ class MotionSpace {
   [[nodiscard]] const MotionSpaceOptions& options() const { return options_; }
   [[nodiscard]] int points() const { return points_; }
   [[nodiscard]] int curves() const { return layout_.curve_count(); }
-  [[nodiscard]] int functions() const;       // of the largest group: the rows of a score matrix
+  [[nodiscard]] int functions() const;       // of the largest group
+  [[nodiscard]] int rows() const;            // of a score matrix: functions, and two ends where the space is pinned
+  [[nodiscard]] int levels() const;          // the level of detail that has all rows
+  [[nodiscard]] int rows_at(int n) const;    // of level of detail n, the ends at least; all when n < 0
   [[nodiscard]] int function_count() const;  // over all groups
   [[nodiscard]] int group_of(int curve) const;
   [[nodiscard]] int group_count() const;
   [[nodiscard]] const std::vector<FunctionGroup>& groups() const { return groups_; }
   [[nodiscard]] const std::vector<CurveMoments>& moments() const { return moments_; }
-  // Share of all variance that the functions cover.
+  // Share of all variance that ends and functions cover; nearly all variance is where curves stand, not how they move.
   [[nodiscard]] double variance_covered() const;
+  // The same of the variance of each curve about its own mean in time.
+  [[nodiscard]] double movement_covered() const;
 
  private:
+  [[nodiscard]] FunctionGroup fit_pinned(const CurveMoments& moments) const;
+  void add_ends(const ScoreMatrix& scores, SampleMatrix& samples) const;
+
   friend Bytes pack_space(const MotionSpace& space);
   friend MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& source);
 

@@ -17,12 +17,9 @@ void require_option(bool legal, const char* field, double value, const char* ran
   throw Error(ErrorKind::usage, {.found = fmt::format("SequenceOptions::{} = {}", field, value), .expected = range});
 }
 
-// What the cuts and the breaks are chosen by, frame by frame.
-struct Movement {
-  std::vector<double> mean_square_speed;  // (cm/s)^2, mean over joints
-  std::vector<double> speed_change;       // cm/s, largest over joints
-  std::vector<int> breaks;                // frames f after which the body is elsewhere
-};
+using UsableCycles = std::function<bool(int cycles)>;
+
+using Movement = SequenceCutter::Movement;
 
 // Steps between consecutive frames (cm, by joint), five at a time, so that a long clip needs no table of positions.
 class StepWindow {
@@ -117,11 +114,16 @@ Lengths legal_lengths(int n, double rate_hz, const SequenceOptions& options) {
   return {std::min(shortest, n / fewest), longest};
 }
 
-Run cut_run(const Movement& movement, int first, int last, double rate_hz, const SequenceOptions& options) {
+// Appends the cuts after `first` up to `last`, in motion that is not cyclic.
+void cut_at_rests(const Movement& movement, int first, int last, double rate_hz, const SequenceOptions& options,
+                  Run& run) {
   const int n = last - first;
-  if (n == 0) return {{first}};
   const auto [shortest, longest] = legal_lengths(n, rate_hz, options);
-  if (n <= longest) return {{first, last}};
+  if (n <= longest) {
+    run.cuts.push_back(last);
+    run.cycles.push_back(0);
+    return;
+  }
 
   const std::vector<double> cost = cut_costs(movement, first, last, options.jerk_weight);
   std::vector<double> best(static_cast<std::size_t>(n) + 1, std::numeric_limits<double>::infinity());
@@ -139,15 +141,54 @@ Run cut_run(const Movement& movement, int first, int last, double rate_hz, const
     }
     if (i < n) best[static_cast<std::size_t>(i)] += cost[static_cast<std::size_t>(i)];
   }
-  Run run;
-  for (int i = n; i >= 0; i = from[static_cast<std::size_t>(i)]) run.cuts.push_back(first + i);
-  std::ranges::reverse(run.cuts);
-  return run;
+  const auto kept = static_cast<std::ptrdiff_t>(run.cuts.size());
+  for (int i = n; i > 0; i = from[static_cast<std::size_t>(i)]) run.cuts.push_back(first + i);
+  std::reverse(run.cuts.begin() + kept, run.cuts.end());
+  run.cycles.resize(run.cuts.size() - 1, 0);
 }
+
+// Appends sequences of whole cycles, as many cycles each as may be.
+void cut_cycles(const CyclicStretch& stretch, const SequenceOptions& options, const UsableCycles& usable, Run& run) {
+  const int cycles = stretch.cycles();
+  for (int at = 0; at < cycles;) {
+    int held = std::min(options.most_cycles, cycles - at);
+    while (held > 1 && !usable(held)) --held;
+    at += held;
+    run.cuts.push_back(stretch.marks[static_cast<std::size_t>(at)]);
+    run.cycles.push_back(static_cast<std::uint8_t>(held));
+  }
+}
+
+Run equal_windows(const Run& run) {
+  Run out{{run.cuts.front()}, {}};
+  const int sequences = run.sequence_count();
+  const int first = run.cuts.front();
+  const int frames = run.cuts.back() - first;
+  for (int i = 1; i <= sequences && frames > 0; ++i) {
+    out.cuts.push_back(first + static_cast<int>(std::lround(static_cast<double>(i) * frames / sequences)));
+  }
+  return out;
+}
+
+Run cut_run(const Movement& movement, const std::vector<CyclicStretch>& stretches, int first, int last, double rate_hz,
+            const SequenceOptions& options, const UsableCycles& usable) {
+  Run run{{first}, {}};
+  for (const CyclicStretch& stretch : stretches) {
+    if (stretch.marks.front() > run.cuts.back()) {
+      cut_at_rests(movement, run.cuts.back(), stretch.marks.front(), rate_hz, options, run);
+    }
+    cut_cycles(stretch, options, usable, run);
+  }
+  if (last > run.cuts.back()) cut_at_rests(movement, run.cuts.back(), last, rate_hz, options, run);
+  return options.equal_windows ? equal_windows(run) : run;
+}
+
 
 }  // namespace
 
 void SequenceOptions::validate() const {
+  require_option(most_cycles >= 0 && most_cycles <= 8, "most_cycles", most_cycles, "0 to 8");
+  cycles.validate();
   require_option(shortest_s > 0, "shortest_s", shortest_s, "seconds above 0");
   require_option(longest_s > shortest_s && std::isfinite(longest_s), "longest_s", longest_s,
                  "seconds above shortest_s");
@@ -157,17 +198,30 @@ void SequenceOptions::validate() const {
   require_option(break_ratio > 1, "break_ratio", break_ratio, "more than 1");
 }
 
-std::vector<Run> cut_sequences(const Clip& clip, const SequenceOptions& options) {
-  options.validate();
-  const Movement movement = measure_movement(clip, options);
+SequenceCutter::SequenceCutter(const Clip& clip, const SequenceOptions& options) : options_(options) {
+  options_.validate();
+  movement_ = measure_movement(clip, options_);
+}
+
+std::vector<Run> SequenceCutter::cut(const ClipCurves& curves, const Skeleton& skeleton,
+                                     const UsableCycles& usable) const {
+  const UsableCycles may = [&](int cycles) { return !usable || usable(cycles); };
+  const bool cyclic = options_.most_cycles > 0 && may(1);
   std::vector<Run> runs;
   int first = 0;
-  for (const int f : movement.breaks) {
-    runs.push_back(cut_run(movement, first, f, clip.rate_hz, options));
-    first = f + 1;
-  }
-  runs.push_back(cut_run(movement, first, clip.frames - 1, clip.rate_hz, options));
+  const auto add_run = [&](int last) {
+    std::vector<CyclicStretch> stretches;
+    if (cyclic) stretches = find_cycles(curves, skeleton, first, last, options_.cycles);
+    runs.push_back(cut_run(movement_, stretches, first, last, curves.rate_hz, options_, may));
+    first = last + 1;
+  };
+  for (const int f : movement_.breaks) add_run(f);
+  add_run(curves.frames() - 1);
   return runs;
+}
+
+std::vector<Run> cut_sequences(const Clip& clip, const SequenceOptions& options) {
+  return SequenceCutter(clip, options).cut(clip_curves(clip), clip.skeleton);
 }
 
 }  // namespace kinespace

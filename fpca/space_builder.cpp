@@ -11,6 +11,7 @@
 #include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/file.h"
 #include "kinespace/fpca/pose_features.h"
 
 namespace kinespace {
@@ -40,56 +41,85 @@ void for_each_clip(const PreparedSource& clips, const Progress& progress, std::s
   progress.at(stage, 1);
 }
 
+// By set of the space: sequences of so many cycles.
+template <typename T>
+using BySet = std::vector<T>;
+using SetMoments = BySet<std::vector<CurveMoments>>;
+
 struct Survey {
   OrientationMoments orientations{0};
   Skeleton skeleton;
   std::string name;
-  double rate_hz = 0;
-  std::vector<int> lengths;  // frames of each sequence less one
+  BySet<int> longest;  // frames of the longest sequence less one; 0 where there is none
+  // Clips with motion that was cut at rests, by a hash of their names: the order in which they are tried.
+  std::vector<std::pair<std::string, int>> at_rests;
 };
 
-int automatic_points(int longest_sequence) {
-  return std::max(48, longest_sequence + 12);
+constexpr int shortest_aligned = 4;  // frames; in fewer there is nothing to align
+
+int automatic_points(int longest_sequence, int cycles) {
+  // Three cycles in as many points move faster than a second does in 85, which is beyond what a body does.
+  const int most = cycles > 0 ? 256 : 1024;
+  return std::clamp(longest_sequence + 12, 48, most);
 }
 
-// Hands over the samples of each sequence of a clip under its warps; the clip's curves go to the space's side.
+// Hands over the set and the samples of each sequence of a clip under its warps; the clip's curves go to the space's
+// side.
 template <typename Visit>
-void visit_samples(const MotionSpace& space, PreparedClip& clip, const std::vector<Warp>& warps, const Visit& visit) {
+void visit_samples(const RegisteredSpace& space, PreparedClip& clip, const std::vector<Warp>& warps,
+                   const Visit& visit) {
   space.apply_references(clip.curves.values);
   std::size_t sequence = 0;
   for (const Run& run : clip.runs) {
     const RunSampler sampler(clip.curves.values, run, clip.curves.rate_hz);
     for (int i = 0; i < run.sequence_count(); ++i, ++sequence) {
+      const auto set = static_cast<std::size_t>(run.cycles_of(i));
+      if (set >= space.sets().size()) continue;
       const Warp warp = warps.empty() ? Warp() : warps[sequence];
-      visit(sampler.sample(run.first_frame(i), run.last_frame(i), warp, space.points()));
+      visit(set, sampler.sample(run.first_frame(i), run.last_frame(i), warp, space.sets()[set].points()));
     }
   }
 }
 
-void merge_into(std::vector<CurveMoments>& all, const std::vector<CurveMoments>& part) {
-  for (std::size_t g = 0; g < all.size(); ++g) all[g].merge(part[g]);
+SetMoments empty_moments(const RegisteredSpace& space) {
+  SetMoments out;
+  for (const MotionSpace& set : space.sets()) out.push_back(set.empty_moments());
+  return out;
 }
 
-std::vector<CurveMoments> gather_moments(const PreparedSource& clips, const MotionSpace& space,
-                                         const std::vector<std::vector<Warp>>& warps, const Compute& compute,
-                                         const Progress& progress, std::string_view stage) {
-  std::vector<CurveMoments> all = space.empty_moments();
-  for_each_clip<std::vector<CurveMoments>>(
+void merge_into(SetMoments& all, const SetMoments& part) {
+  for (std::size_t set = 0; set < all.size(); ++set) {
+    for (std::size_t g = 0; g < all[set].size(); ++g) all[set][g].merge(part[set][g]);
+  }
+}
+
+SetMoments moments_of(const RegisteredSpace& space, PreparedClip& clip, const std::vector<Warp>& warps,
+                      const Compute& compute) {
+  SetMoments part = empty_moments(space);
+  BySet<std::vector<SampleMatrix>> samples(part.size());
+  visit_samples(space, clip, warps, [&](std::size_t set, SampleMatrix&& of_sequence) {
+    samples[set].push_back(std::move(of_sequence));
+    if (samples[set].size() < sequences_per_block) return;
+    space.sets()[set].accumulate(samples[set], part[set], compute);
+    samples[set].clear();
+  });
+  for (std::size_t set = 0; set < part.size(); ++set) {
+    if (!samples[set].empty()) space.sets()[set].accumulate(samples[set], part[set], compute);
+  }
+  return part;
+}
+
+SetMoments gather_moments(const PreparedSource& clips, const RegisteredSpace& space,
+                          const std::vector<std::vector<Warp>>& warps, const Compute& compute, const Progress& progress,
+                          std::string_view stage) {
+  SetMoments all = empty_moments(space);
+  for_each_clip<SetMoments>(
       clips, progress, stage,
       [&](int i, PreparedClip& clip) {
-        std::vector<CurveMoments> part = space.empty_moments();
-        std::vector<SampleMatrix> samples;
-        visit_samples(space, clip, warps.empty() ? std::vector<Warp>() : warps[static_cast<std::size_t>(i)],
-                      [&](SampleMatrix&& of_sequence) {
-                        samples.push_back(std::move(of_sequence));
-                        if (samples.size() < sequences_per_block) return;
-                        space.accumulate(samples, part, compute);
-                        samples.clear();
-                      });
-        if (!samples.empty()) space.accumulate(samples, part, compute);
-        return part;
+        return moments_of(space, clip, warps.empty() ? std::vector<Warp>() : warps[static_cast<std::size_t>(i)],
+                          compute);
       },
-      [&](int, std::vector<CurveMoments>& part) { merge_into(all, part); });
+      [&](int, SetMoments& part) { merge_into(all, part); });
   return all;
 }
 
@@ -103,13 +133,14 @@ struct SequenceTable {
 SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace& space, int functions,
                                  const Progress& progress) {
   SequenceTable table;
+  const RegisteredSpace one_set(space);
   std::vector<Eigen::VectorXf> vectors;
   using Vectors = std::vector<Eigen::VectorXf>;
   for_each_clip<Vectors>(
       clips, progress, "group",
       [&](int, PreparedClip& clip) {
         Vectors out;
-        visit_samples(space, clip, {}, [&](const SampleMatrix& samples) {
+        visit_samples(one_set, clip, {}, [&](std::size_t, const SampleMatrix& samples) {
           const ScoreMatrix scores = space.scores(samples);
           const Eigen::Index n = std::min<Eigen::Index>(functions, scores.rows());
           out.emplace_back(Eigen::Map<const Eigen::VectorXf>(scores.data(), n * scores.cols()));
@@ -129,7 +160,7 @@ SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace&
   return table;
 }
 
-// Hands over the keyframe features of each sequence of a clip, in order.
+// Hands over the keyframe features of each sequence of a clip that was cut at rests, in order.
 template <typename Visit>
 void visit_features(const PreparedClip& clip, const Visit& visit) {
   const PoseFeatureSource source(clip.curves, clip.skeleton);
@@ -137,6 +168,7 @@ void visit_features(const PreparedClip& clip, const Visit& visit) {
   std::vector<float> features;
   for (const Run& run : clip.runs) {
     for (int i = 0; i < run.sequence_count(); ++i) {
+      if (run.cycles_of(i) > 0) continue;
       const int from = std::min(static_cast<int>(std::lround(run.first_frame(i) * keys_per_frame)), source.rows() - 1);
       const int to =
           std::clamp(static_cast<int>(std::lround(run.last_frame(i) * keys_per_frame)), from, source.rows() - 1);
@@ -171,13 +203,15 @@ FeatureSet template_features(const PreparedSource& clips, const SequenceTable& t
   return out;
 }
 
-// For each sequence the warp that its group's template proposes, identity where there is none. By clip.
+// For each sequence that was cut at rests the warp that its group's template proposes, identity where there is none. By
+// clip.
 std::vector<std::vector<Warp>> propose_warps(const PreparedSource& clips, const MotionSpace& space,
                                              const AlignmentOptions& options, const Compute& compute,
                                              const Progress& progress) {
   std::vector<std::vector<Warp>> out(static_cast<std::size_t>(clips.count));
   if (options.templates == 0) return out;
   const SequenceTable table = tabulate_sequences(clips, space, 3, progress);
+  if (table.clip.empty()) return out;
   const TemplateGroups groups = group_sequences(table.vectors, options.templates);
   const FeatureSet templates = template_features(clips, table, groups, progress);
   for_each_clip<std::vector<Warp>>(
@@ -210,16 +244,34 @@ std::vector<std::vector<Warp>> propose_warps(const PreparedSource& clips, const 
   return out;
 }
 
-std::vector<Warp> align_prepared(const WarpSearch& search, const MotionSpace& space, PreparedClip& clip,
+// Warps for the sequences of a clip that were cut at rests, the identity for whole cycles: their phases agree already.
+std::vector<Warp> align_prepared(const WarpSearch& search, const RegisteredSpace& space, PreparedClip& clip,
                                  const std::vector<Warp>& proposals) {
   space.apply_references(clip.curves.values);
   std::vector<Warp> out;
+  std::size_t at_rests = 0;
   for (const Run& run : clip.runs) {
     const RunSampler sampler(clip.curves.values, run, clip.curves.rate_hz);
     for (int i = 0; i < run.sequence_count(); ++i) {
+      if (run.cycles_of(i) > 0) {
+        out.emplace_back();
+        continue;
+      }
       std::span<const Warp> proposal;
-      if (!proposals.empty()) proposal = std::span(proposals).subspan(out.size(), 1);
+      if (!proposals.empty()) proposal = std::span(proposals).subspan(at_rests++, 1);
       out.push_back(search.best(sampler, run.first_frame(i), run.last_frame(i), proposal));
+    }
+  }
+  return out;
+}
+
+// Those of the warps of a clip that belong to sequences that were cut at rests.
+std::vector<Warp> at_rests(const PreparedClip& clip, const std::vector<Warp>& warps) {
+  std::vector<Warp> out;
+  std::size_t sequence = 0;
+  for (const Run& run : clip.runs) {
+    for (int i = 0; i < run.sequence_count(); ++i, ++sequence) {
+      if (run.cycles_of(i) == 0) out.push_back(warps[sequence]);
     }
   }
   return out;
@@ -227,22 +279,27 @@ std::vector<Warp> align_prepared(const WarpSearch& search, const MotionSpace& sp
 
 Survey survey(const PreparedSource& clips, const Progress& progress) {
   Survey all;
-  int longest = 0;
   for_each_clip<Survey>(
       clips, progress, "survey",
-      [](int, PreparedClip& clip) {
+      [](int i, PreparedClip& clip) {
         Survey one{.orientations = OrientationMoments(curve_layout(clip.skeleton).joint_count()),
                    .skeleton = clip.skeleton,
                    .name = clip.curves.name,
-                   .rate_hz = clip.curves.rate_hz};
+                   .longest = {0}};
         one.orientations.add(clip.curves.values);
         for (const Run& run : clip.runs) {
-          for (int i = 0; i < run.sequence_count(); ++i) one.lengths.push_back(run.last_frame(i) - run.first_frame(i));
+          for (int k = 0; k < run.sequence_count(); ++k) {
+            const auto set = static_cast<std::size_t>(run.cycles_of(k));
+            if (set >= one.longest.size()) one.longest.resize(set + 1, 0);
+            one.longest[set] = std::max(one.longest[set], run.last_frame(k) - run.first_frame(k));
+          }
+        }
+        if (one.longest[0] >= shortest_aligned) {
+          one.at_rests.emplace_back(content_hash(std::as_bytes(std::span(clip.curves.name))), i);
         }
         return one;
       },
       [&](int i, Survey& one) {
-        for (const int n : one.lengths) longest = std::max(longest, n);
         if (i == 0) {
           all = std::move(one);
           return;
@@ -254,20 +311,28 @@ Survey survey(const PreparedSource& clips, const Progress& progress) {
                                              .remedy = "build them apart, or give --by-skeleton for one space each"});
         }
         all.orientations.merge(one.orientations);
+        all.at_rests.insert(all.at_rests.end(), one.at_rests.begin(), one.at_rests.end());
+        all.longest.resize(std::max(all.longest.size(), one.longest.size()), 0);
+        for (std::size_t set = 0; set < one.longest.size(); ++set) {
+          all.longest[set] = std::max(all.longest[set], one.longest[set]);
+        }
       });
-  all.lengths = {longest};
   return all;
 }
 
 }  // namespace
 
 PreparedClip prepare(const Clip& clip, const SequenceOptions& options) {
-  return {clip.skeleton, clip_curves(clip), cut_sequences(clip, options)};
+  ClipCurves curves = clip_curves(clip);
+  std::vector<Run> runs = SequenceCutter(clip, options).cut(curves, clip.skeleton);
+  return {clip.skeleton, std::move(curves), std::move(runs)};
 }
 
 PreparedClip prepare(Clip&& clip, const SequenceOptions& options) {
-  PreparedClip out{.skeleton = clip.skeleton, .curves = {}, .runs = cut_sequences(clip, options)};
+  const SequenceCutter cutter(clip, options);
+  PreparedClip out{.skeleton = clip.skeleton, .curves = {}, .runs = {}};
   out.curves = clip_curves(std::move(clip));
+  out.runs = cutter.cut(out.curves, out.skeleton);
   return out;
 }
 
@@ -281,62 +346,186 @@ void SpaceBuildOptions::validate() const {
   alignment.validate();
 }
 
+namespace {
+
+// The first set that there are sequences for.
+std::size_t first_set(const Survey& found) {
+  const auto first = std::ranges::find_if(found.longest, [](int longest) { return longest > 0; });
+  return first == found.longest.end() ? 0 : static_cast<std::size_t>(first - found.longest.begin());
+}
+
+// Sets without functions: one for each kind of sequence that there is, and that of sequences cut at rests.
+RegisteredSpace empty_space(const Survey& found, const MotionSpaceOptions& options, const Eigen::Matrix4Xd& references) {
+  std::vector<MotionSpace> sets;
+  for (std::size_t set = 0; set < found.longest.size(); ++set) {
+    MotionSpaceOptions of_set = options;
+    of_set.cycles = static_cast<int>(set);
+    // A set that nothing was cut for is made of what there is (fit_sets).
+    const std::size_t made_of = set == 0 ? first_set(found) : set;
+    const int points = options.points != 0
+                           ? options.points
+                           : automatic_points(found.longest[made_of], static_cast<int>(made_of));
+    sets.emplace_back(found.skeleton, of_set, points).set_references(references);
+  }
+  return RegisteredSpace(std::move(sets));
+}
+
+// The sets of a space, and new ones for kinds of sequences that it has not met.
+RegisteredSpace with_new_sets(const RegisteredSpace& space, const Survey& found) {
+  std::vector<MotionSpace> sets = space.sets();
+  const RegisteredSpace fresh = empty_space(found, space.options(), space.references());
+  for (std::size_t set = 0; set < fresh.sets().size(); ++set) {
+    if (set >= sets.size()) {
+      sets.push_back(fresh.sets()[set]);
+    } else if (sets[set].functions() == 0) {
+      sets[set] = fresh.sets()[set];
+    }
+  }
+  return RegisteredSpace(std::move(sets));
+}
+
+// Finds the functions of every set. Where no motion was cut at rests, the set for it is made of the cycles, so that
+// other clips can be described at all.
+RegisteredSpace fit_sets(const RegisteredSpace& space, SetMoments moments) {
+  std::vector<MotionSpace> sets = space.sets();
+  for (std::size_t set = 1; set < sets.size(); ++set) sets[set].fit(std::move(moments[set]));
+  if (moments[0][0].count() == 0) {
+    const auto first = std::ranges::find_if(sets, [](const MotionSpace& set) { return set.functions() > 0; });
+    if (first != sets.end() && first->points() == sets[0].points()) moments[0] = first->moments();
+  }
+  sets[0].fit(std::move(moments[0]));
+  return RegisteredSpace(std::move(sets));
+}
+
+// The functions of motion that was cut at rests, under warps, as all curves share them, whatever the grouping of the
+// result.
+MotionSpace fit_pooled(const PreparedSource& clips, const RegisteredSpace& space,
+                       const std::vector<std::vector<Warp>>& warps, const SpaceBuildOptions& options,
+                       const Compute& compute, const Progress& progress) {
+  MotionSpaceOptions pooled_options{.functions = 2 * options.alignment.functions, .pinned = options.space.pinned};
+  MotionSpace pooled(space.skeleton(), pooled_options, space.plain().points());
+  pooled.set_references(space.references());
+  pooled.fit(std::move(gather_moments(clips, pooled, warps, compute, progress, "analyse").front()));
+  return pooled;
+}
+
+// Warps for all clips, refined in rounds against the functions of the round before; none where there is nothing to
+// align.
+std::vector<std::vector<Warp>> align_all(const PreparedSource& clips, const RegisteredSpace& space,
+                                         const SpaceBuildOptions& options, const Compute& compute,
+                                         const Progress& progress) {
+  MotionSpace pooled = fit_pooled(clips, space, {}, options, compute, progress);
+  if (pooled.functions() == 0) return {};
+  std::vector<std::vector<Warp>> warps = propose_warps(clips, pooled, options.alignment, compute, progress);
+  for (int round = 0; round < options.alignment.rounds; ++round) {
+    if (round > 0) pooled = fit_pooled(clips, space, warps, options, compute, progress);
+    const WarpSearch search(pooled, options.alignment);
+    std::vector<std::vector<Warp>> next(static_cast<std::size_t>(clips.count));
+    for_each_clip<std::vector<Warp>>(
+        clips, progress, "align",
+        [&](int i, PreparedClip& clip) {
+          // The first round has proposals for sequences cut at rests; later ones refine from there.
+          const std::vector<Warp>& before = warps[static_cast<std::size_t>(i)];
+          return align_prepared(search, space, clip, round == 0 ? before : at_rests(clip, before));
+        },
+        [&](int i, std::vector<Warp>& w) { next[static_cast<std::size_t>(i)] = std::move(w); });
+    warps = std::move(next);
+  }
+  return warps;
+}
+
+PreparedSource part_of(const PreparedSource& clips, std::span<const std::pair<std::string, int>> chosen) {
+  return {static_cast<int>(chosen.size()),
+          [&clips, chosen](int i) { return clips.load(chosen[static_cast<std::size_t>(i)].second); }};
+}
+
+// What the first functions leave of the sequences of clips that were cut at rests, under the best warps or under none.
+double residual_of(const PreparedSource& clips, const RegisteredSpace& space, const WarpSearch& search, bool warped,
+                   const Progress& progress) {
+  double sum = 0;
+  for_each_clip<double>(
+      clips, progress, "align",
+      [&](int, PreparedClip& clip) {
+        double left = 0;
+        space.apply_references(clip.curves.values);
+        for (const Run& run : clip.runs) {
+          const RunSampler sampler(clip.curves.values, run, clip.curves.rate_hz);
+          for (int i = 0; i < run.sequence_count(); ++i) {
+            const int first = run.first_frame(i);
+            const int last = run.last_frame(i);
+            if (run.cycles_of(i) > 0 || last - first < shortest_aligned) continue;
+            left += search.residual(sampler, first, last, warped ? search.best(sampler, first, last, {}) : Warp());
+          }
+        }
+        return left;
+      },
+      [&](int, double& left) { sum += left; });
+  return sum;
+}
+
+// Warps cost time and bytes, and what they win on the motion they were found with they may lose on other motion. So
+// they are found for four fifths of a few clips, and kept only if functions under them leave less of the last fifth.
+bool alignment_pays(const PreparedSource& clips, Survey& found, const RegisteredSpace& space,
+                    const SpaceBuildOptions& options, const Compute& compute, const Progress& progress) {
+  constexpr std::size_t fewest = 10;
+  constexpr std::size_t most = 80;
+  constexpr double worth_it = 0.95;
+  std::ranges::sort(found.at_rests);
+  const std::span<const std::pair<std::string, int>> tried(found.at_rests.data(),
+                                                           std::min(most, found.at_rests.size()));
+  if (tried.size() < fewest) return false;
+  const PreparedSource held_out = part_of(clips, tried.first(tried.size() / 5));
+  const PreparedSource known = part_of(clips, tried.subspan(tried.size() / 5));
+  const auto residual = [&](const std::vector<std::vector<Warp>>& warps, bool warped) {
+    const WarpSearch search(fit_pooled(known, space, warps, options, compute, progress), options.alignment);
+    return residual_of(held_out, space, search, warped, progress);
+  };
+  const double plain = residual({}, false);
+  return residual(align_all(known, space, options, compute, progress), true) < worth_it * plain;
+}
+
+}  // namespace
+
 BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& options, const Compute& compute,
                        const Progress& progress) {
   options.validate();
   if (clips.count == 0) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "one clip or more"});
-  const Survey found = survey(clips, progress);
-  const int points =
-      options.space.points != 0 ? options.space.points : std::min(1024, automatic_points(found.lengths.front()));
-  const Eigen::Matrix4Xd references = found.orientations.references();
-
-  MotionSpace space(found.skeleton, options.space, points);
-  space.set_references(references);
+  Survey found = survey(clips, progress);
+  RegisteredSpace space = empty_space(found, options.space, found.orientations.references());
   std::vector<std::vector<Warp>> warps;
-  if (options.align && options.alignment.rounds > 0) {
-    // Aligned for the functions that all curves share, whatever the grouping of the result.
-    MotionSpace pooled(found.skeleton, {.functions = 2 * options.alignment.functions}, points);
-    pooled.set_references(references);
-    pooled.fit(gather_moments(clips, pooled, {}, compute, progress, "analyse"));
-    const auto proposals = propose_warps(clips, pooled, options.alignment, compute, progress);
-    for (int round = 0; round < options.alignment.rounds; ++round) {
-      const WarpSearch search(pooled, options.alignment);
-      std::vector<std::vector<Warp>> next(static_cast<std::size_t>(clips.count));
-      for_each_clip<std::vector<Warp>>(
-          clips, progress, "align",
-          [&](int i, PreparedClip& clip) {
-            const auto index = static_cast<std::size_t>(i);
-            return align_prepared(search, pooled, clip, warps.empty() ? proposals[index] : warps[index]);
-          },
-          [&](int i, std::vector<Warp>& w) { next[static_cast<std::size_t>(i)] = std::move(w); });
-      warps = std::move(next);
-      if (round + 1 < options.alignment.rounds)
-        pooled.fit(gather_moments(clips, pooled, warps, compute, progress, "analyse"));
-    }
-  }
-  space.fit(gather_moments(clips, space, warps, compute, progress, "analyse"));
+  const bool warped = options.align && options.alignment.rounds > 0 &&
+                      alignment_pays(clips, found, space, options, compute, progress);
+  if (warped) warps = align_all(clips, space, options, compute, progress);
+  space = fit_sets(space, gather_moments(clips, space, warps, compute, progress, "analyse"));
+  space.set_warped(warped);
   if (warps.empty()) warps.resize(static_cast<std::size_t>(clips.count));
   return {std::move(space), std::move(warps)};
 }
 
-BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips, const SpaceBuildOptions& options,
+BuiltSpace extend_space(const RegisteredSpace& space, const PreparedSource& clips, const SpaceBuildOptions& options,
                         const Compute& compute, const Progress& progress) {
   options.validate();
   std::vector<std::vector<Warp>> warps(static_cast<std::size_t>(clips.count));
   // Functions of all curves together are what warps are searched against; spaces of other groupings take clips as they
   // are.
-  if (options.align && options.alignment.rounds > 0 && space.options().grouping == Grouping::all_together) {
-    const WarpSearch search(space, options.alignment);
+  if (options.align && space.warped() && options.alignment.rounds > 0 && space.options().grouping == Grouping::all_together &&
+      space.plain().functions() > 0) {
+    const WarpSearch search(space.plain(), options.alignment);
     for_each_clip<std::vector<Warp>>(
         clips, progress, "align", [&](int, PreparedClip& clip) { return align_prepared(search, space, clip, {}); },
         [&](int i, std::vector<Warp>& w) { warps[static_cast<std::size_t>(i)] = std::move(w); });
   }
-  std::vector<CurveMoments> moments = space.moments();
-  merge_into(moments, gather_moments(clips, space, warps, compute, progress, "analyse"));
-  MotionSpace extended(space.skeleton(), space.options(), space.points());
-  extended.set_references(space.references());
-  extended.fit(std::move(moments));
-  return {std::move(extended), std::move(warps)};
+  const RegisteredSpace extended = with_new_sets(space, survey(clips, progress));
+  SetMoments moments = gather_moments(clips, extended, warps, compute, progress, "analyse");
+  for (std::size_t set = 0; set < space.sets().size(); ++set) {
+    for (std::size_t g = 0; g < moments[set].size(); ++g) {
+      const std::vector<CurveMoments>& before = space.sets()[set].moments();
+      if (g < before.size()) moments[set][g].merge(before[g]);
+    }
+  }
+  BuiltSpace built{fit_sets(extended, std::move(moments)), std::move(warps)};
+  built.space.set_warped(space.warped());
+  return built;
 }
 
 OrientationMoments::OrientationMoments(int joints) : sums_(static_cast<std::size_t>(joints), Eigen::Matrix4d::Zero()) {}
@@ -366,17 +555,6 @@ Eigen::Matrix4Xd OrientationMoments::references() const {
     axis.cwiseAbs().maxCoeff(&largest);
     if (axis(largest) < 0) axis = -axis;
     out.col(static_cast<Eigen::Index>(k)) = axis;
-  }
-  return out;
-}
-
-std::vector<Warp> align_clip(const WarpSearch& search, const ClipCurves& curves, const std::vector<Run>& runs) {
-  std::vector<Warp> out;
-  for (const Run& run : runs) {
-    const RunSampler sampler(curves.values, run, curves.rate_hz);
-    for (int i = 0; i < run.sequence_count(); ++i) {
-      out.push_back(search.best(sampler, run.first_frame(i), run.last_frame(i), {}));
-    }
   }
   return out;
 }

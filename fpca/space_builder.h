@@ -42,7 +42,7 @@ struct PreparedSource {
 [[nodiscard]] PreparedSource source_of(const std::vector<PreparedClip>& clips);
 
 struct SpaceBuildOptions {
-  MotionSpaceOptions space;
+  MotionSpaceOptions space{.pinned = true};  // `cycles` is each set's own
   SequenceOptions sequences;
   AlignmentOptions alignment;
   bool align = true;
@@ -51,7 +51,7 @@ struct SpaceBuildOptions {
 };
 
 struct BuiltSpace {
-  MotionSpace space;
+  RegisteredSpace space;
   std::vector<std::vector<Warp>> warps;  // for each clip, one a sequence
 };
 
@@ -63,7 +63,7 @@ struct BuiltSpace {
 // The space with more clips in it: the moments of the new clips (aligned to the functions that are there) are merged
 // into the space's own, exactly, and the functions found anew. Grid, references, grouping and options stay those of
 // `space`.
-[[nodiscard]] BuiltSpace extend_space(const MotionSpace& space, const PreparedSource& clips,
+[[nodiscard]] BuiltSpace extend_space(const RegisteredSpace& space, const PreparedSource& clips,
                                       const SpaceBuildOptions& options, const Compute& compute = {},
                                       const Progress& progress = {});
 
@@ -78,9 +78,5 @@ class OrientationMoments {
  private:
   std::vector<Eigen::Matrix4d> sums_;
 };
-
-// Warps of one clip against a space, without templates: how clips outside the library are aligned.
-[[nodiscard]] std::vector<Warp> align_clip(const WarpSearch& search, const ClipCurves& curves,
-                                           const std::vector<Run>& runs);
 
 }  // namespace kinespace

@@ -23,13 +23,14 @@ namespace kinespace {
 namespace {
 
 constexpr int clips_per_block = 16;
-constexpr int importer_version = 2;  // raise it when imports of the same file would come out otherwise
+constexpr int importer_version = 3;  // raise it when imports of the same file would come out otherwise
 
 // Everything that an import depends on besides its file.
 std::string fingerprint_of(const LibraryBuilderOptions& options) {
   const SequenceOptions& s = options.space.sequences;
-  return fmt::format("importer {} sequences {} {} {} {} {} {}", importer_version, s.shortest_s, s.longest_s,
-                     s.length_weight, s.jerk_weight, s.break_cm, s.break_ratio);
+  return fmt::format("importer {} sequences {} {} {} {} {} {} cycles {} {} {} {} {}", importer_version, s.shortest_s,
+                     s.longest_s, s.length_weight, s.jerk_weight, s.break_cm, s.break_ratio, s.most_cycles,
+                     s.cycles.shortest_s, s.cycles.longest_s, s.cycles.most_difference, s.equal_windows ? 1 : 0);
 }
 
 // One file on its way into the library.
@@ -150,7 +151,7 @@ MeasuredError distance(const JointPositions& a, const JointPositions& b) {
   return out.error();
 }
 
-MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, const EncodedClip& encoded) {
+MeasuredError measure_error(const PreparedClip& clip, const RegisteredSpace& space, const EncodedClip& encoded) {
   JointDistance out;
   decode_in_parts(space, encoded, -1, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
     const auto original = clip.curves.values.middleRows(first, rows.rows());
@@ -158,6 +159,17 @@ MeasuredError measure_error(const PreparedClip& clip, const MotionSpace& space, 
             joint_positions(clip_of_frames(clip.curves, rows, first, clip.skeleton)));
   });
   return out.error();
+}
+
+void count_cycles(const EncodedClip& clip, LibraryReport& report) {
+  report.seconds += clip.frames / clip.rate_hz;
+  for (const EncodedRun& run : clip.runs) {
+    for (const EncodedSequence& s : run.sequences) {
+      if (s.cycles == 0) continue;
+      report.cycles += s.cycles;
+      report.cyclic_seconds += (s.last - s.first) / clip.rate_hz;
+    }
+  }
 }
 
 // What a space does with the clips of one joint tree.
@@ -222,6 +234,7 @@ class SpaceWriter {
     report.mean_joint_error_cm += weight * ready.clip.error.mean_joint_error_cm;
     report.max_joint_error_cm = std::max(report.max_joint_error_cm, ready.clip.error.max_joint_error_cm);
     report.sequences += ready.clip.sequence_count();
+    count_cycles(ready.clip, report);
     report.frames += row.frames;
     ++report.added;
   }
@@ -235,7 +248,7 @@ class SpaceWriter {
 };
 
 // Puts the clips that are there already into the extended spaces.
-void transfer_clips(Library& library, std::int64_t space_id, const MotionSpace& from, const MotionSpace& to,
+void transfer_clips(Library& library, std::int64_t space_id, const RegisteredSpace& from, const RegisteredSpace& to,
                     const ClipSpace& clips_from, const ClipSpace& clips_to) {
   for (const ClipRow& row : library.clips()) {
     if (row.space_id != space_id) continue;
@@ -247,7 +260,7 @@ void transfer_clips(Library& library, std::int64_t space_id, const MotionSpace& 
                     {.name = row.name, .rate_hz = row.rate_hz, .frames = static_cast<int>(row.frames)}, row.name);
     const JointPositions before = joint_positions(clip_from_curves(decode(from, clip), skeleton));
     for (EncodedRun& run : clip.runs) {
-      for (EncodedSequence& s : run.sequences) s.scores = to.transfer(s.scores, from);
+      for (EncodedSequence& s : run.sequences) s.scores = to.of(s.cycles).transfer(s.scores, from.of(s.cycles));
     }
     round_to_stored(clip);
     // Its own curves are not there any more; with what the transfer moves added, its error is never less than it is.
@@ -286,7 +299,7 @@ void build_tree(const std::string& tree_hash, const std::vector<const Import*>& 
   }
   if (old_space && old_clips) {
     const std::string name = build.target().string();
-    const MotionSpace from = unpack_space(old_space->blob, name);
+    const RegisteredSpace from = unpack_registered_space(old_space->blob, name);
     const ClipSpace clips_from = ClipSpace::unpack(old_clips->blob, name);
     const BuiltSpace built = extend_space(from, source, options.space, compute, progress);
     const ClipSpace clips = clips_from.extend(source, progress);
@@ -314,13 +327,21 @@ void summarise(Library& library, LibraryReport& report) {
   const std::int64_t sequences = report.sequences + library.metadata_count("sequences").value_or(0);
   library.set_metadata("sequences", std::to_string(sequences));
   report.sequences = static_cast<int>(sequences);
+  report.cycles += library.metadata_count("cycles").value_or(0);
+  library.set_metadata("cycles", std::to_string(report.cycles));
+  report.cyclic_seconds += library.metadata_number("cyclic_seconds").value_or(0);
+  library.set_metadata("cyclic_seconds", fmt::format("{:.3f}", report.cyclic_seconds));
+  report.seconds = library.totals().seconds;
   report.variance = 1;
+  report.movement = 1;
   for (const SpaceRow& row : library.spaces()) {
     if (!row.name.starts_with("sequences ")) continue;
-    const MotionSpace space = unpack_space(library.space(row.id).blob, row.name);
+    const RegisteredSpace space = unpack_registered_space(library.space(row.id).blob, row.name);
     ++report.spaces;
     report.functions = std::max(report.functions, space.functions());
     report.variance = std::min(report.variance, space.variance_covered());
+    report.movement = std::min(report.movement, space.movement_covered());
+    report.warped = report.warped || space.warped();
   }
   library.set_metadata("functions", std::to_string(report.functions));
   library.set_metadata("variance", fmt::format("{:.9f}", report.variance));

@@ -32,10 +32,15 @@ struct LibraryReport {
   int sequences = 0;
   int spaces = 0;
   int functions = 0;               // of the largest space
-  double variance = 0;             // share covered, least of all spaces
+  double variance = 0;             // share covered, least of all spaces ...
+  double movement = 0;             // ... and of each curve's about its own mean
   double mean_joint_error_cm = 0;  // of decoding the added clips with all functions
   double max_joint_error_cm = 0;
   std::int64_t frames = 0;
+  double seconds = 0;         // of the library
+  std::int64_t cycles = 0;    // whole ones in it ...
+  double cyclic_seconds = 0;  // ... and how long they last together
+  bool warped = false;      // whether warps of motion that was cut at rests won on held-out clips
   std::int64_t bytes = 0;
   std::vector<std::string> doubts;  // what looks wrong in clips (motion/plausibility.h), a line a kind
 };

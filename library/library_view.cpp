@@ -85,10 +85,11 @@ ClipRow LibraryView::require_clip(const std::string& name) const {
                          : "the library has no clips"});
 }
 
-const MotionSpace& LibraryView::space(std::int64_t space_id) {
+const RegisteredSpace& LibraryView::space(std::int64_t space_id) {
   const auto found = spaces_.find(space_id);
   if (found != spaces_.end()) return found->second;
-  return spaces_.emplace(space_id, unpack_space(library_.space(space_id).blob, library_.path().string())).first->second;
+  return spaces_.emplace(space_id, unpack_registered_space(library_.space(space_id).blob, library_.path().string()))
+      .first->second;
 }
 
 const ClipSpace& LibraryView::clip_space(std::int64_t space_id) {
@@ -152,7 +153,7 @@ std::optional<Clip> LibraryView::unchanged_source(const ClipRow& row) const {
 }
 
 LibraryView::LevelOfDetail LibraryView::level_for_error(const ClipRow& row, double max_error_cm) {
-  const MotionSpace& s = space(row.space_id);
+  const RegisteredSpace& s = space(row.space_id);
   const Skeleton& bones = skeleton(row.skeleton_id);
   const EncodedClip whole = encoded(row);
   const std::optional<Clip> source = unchanged_source(row);
@@ -165,14 +166,14 @@ LibraryView::LevelOfDetail LibraryView::level_for_error(const ClipRow& row, doub
   };
   // The error falls with n but for small waves, so the first n that is good enough is looked for one by one.
   double error = unseen_cm;
-  for (int n = 0; n <= s.functions() && unseen_cm <= max_error_cm; ++n) {
+  for (int n = 0; n <= s.levels() && unseen_cm <= max_error_cm; ++n) {
     error = error_of(n);
     if (error <= max_error_cm) return {n, error, source.has_value()};
   }
   refuse_level(library_, row, fmt::format("{:.3g} cm", error), max_error_cm);
 }
 
-void store_clip(Library& library, const ClipRow& row, const EncodedClip& clip, const MotionSpace& space,
+void store_clip(Library& library, const ClipRow& row, const EncodedClip& clip, const RegisteredSpace& space,
                 const std::vector<float>& retrieval, bool replace_blobs) {
   PackedClip packed = pack_clip(clip, space);
   const ClipBlobs blobs{std::move(packed.vectors), std::move(packed.warps), std::move(packed.side), retrieval};

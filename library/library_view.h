@@ -32,13 +32,13 @@ class LibraryView {
   [[nodiscard]] ClipRow require_clip(const std::string& name) const;
 
   // Loaded on first use and kept.
-  [[nodiscard]] const MotionSpace& space(std::int64_t space_id);
+  [[nodiscard]] const RegisteredSpace& space(std::int64_t space_id);
   [[nodiscard]] const ClipSpace& clip_space(std::int64_t space_id);
   [[nodiscard]] const Skeleton& skeleton(std::int64_t skeleton_id);
   // The space for clips of such a skeleton; nullopt when the library has none.
   [[nodiscard]] std::optional<std::int64_t> space_for(const Skeleton& skeleton) const;
 
-  // With at most `functions` functions (all when < 0).
+  // At level of detail `functions` (all when < 0).
   [[nodiscard]] EncodedClip encoded(const ClipRow& row, int functions = -1);
   [[nodiscard]] ClipCurves curves(const ClipRow& row, int functions = -1);
   [[nodiscard]] Clip clip(const ClipRow& row, int functions = -1);
@@ -58,13 +58,13 @@ class LibraryView {
   [[nodiscard]] std::optional<Clip> unchanged_source(const ClipRow& row) const;
 
   Library library_;
-  std::map<std::int64_t, MotionSpace> spaces_;
+  std::map<std::int64_t, RegisteredSpace> spaces_;
   std::map<std::int64_t, ClipSpace> clip_spaces_;
   std::map<std::int64_t, Skeleton> skeletons_;
 };
 
 // Writes one clip's rows; used by the builder and by whoever adds to a library.
-void store_clip(Library& library, const ClipRow& row, const EncodedClip& clip, const MotionSpace& space,
+void store_clip(Library& library, const ClipRow& row, const EncodedClip& clip, const RegisteredSpace& space,
                 const std::vector<float>& retrieval, bool replace_blobs);
 
 }  // namespace kinespace

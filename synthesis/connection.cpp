@@ -32,14 +32,17 @@ constexpr int minima_refined = 5;
 constexpr double worth_refining = 2;  // cells that cost so many times the best are left
 constexpr int refinements = 6;
 constexpr int most_functions = 64;
-// What motions can be scored in: an orthonormal basis (trapezoid rule) of the span of 1, the mean and the functions.
+// What motions can be scored in: an orthonormal basis (trapezoid rule) of the span of 1, the mean and the functions, and
+// of s where functions vanish at the ends.
 SampleMatrix orthonormal_functions(const MotionSpace& space, int count) {
   const auto group = std::ranges::max_element(space.groups(), {}, &FunctionGroup::variance);
-  const auto wanted = std::min<Eigen::Index>(count, group->functions.cols() + 2);
+  const Eigen::Index given = space.options().pinned ? 3 : 2;
+  const auto wanted = std::min<Eigen::Index>(count, group->functions.cols() + given);
   SampleMatrix columns(space.points(), wanted);
   columns.col(0).setOnes();
   columns.col(1) = group->mean;
-  columns.rightCols(wanted - 2) = group->functions.leftCols(wanted - 2);
+  if (space.options().pinned) columns.col(2).setLinSpaced(space.points(), 0, 1);
+  columns.rightCols(wanted - given) = group->functions.leftCols(wanted - given);
   const UniformSpline spline(std::move(columns));
   SampleMatrix at(function_points, wanted);
   for (int i = 0; i < function_points; ++i) {

@@ -7,12 +7,19 @@
 namespace kinespace {
 namespace {
 
-// T x (1 + n): the mean and the first n functions of a group; zeros where it has fewer.
-SampleMatrix entries_of(const FunctionGroup& group, int n) {
-  SampleMatrix out = SampleMatrix::Zero(group.mean.size(), n + 1);
+// T x (1 + rows): the mean, the lines between the ends where they are kept, and the functions of a group; zeros where it
+// has fewer.
+SampleMatrix entries_of(const FunctionGroup& group, bool pinned, int rows) {
+  SampleMatrix out = SampleMatrix::Zero(group.mean.size(), rows + 1);
   out.col(0) = group.mean;
-  const Eigen::Index k = std::min<Eigen::Index>(n, group.functions.cols());
-  out.middleCols(1, k) = group.functions.leftCols(k);
+  Eigen::Index next = 1;
+  if (pinned && rows >= 2) {
+    out.col(1).setLinSpaced(out.rows(), 1, 0);
+    out.col(2).setLinSpaced(out.rows(), 0, 1);
+    next = 3;
+  }
+  const Eigen::Index k = std::min<Eigen::Index>(rows + 1 - next, group.functions.cols());
+  out.middleCols(next, k) = group.functions.leftCols(k);
   return out;
 }
 
@@ -67,29 +74,39 @@ std::vector<SampleMatrix> integrals_of(const SampleMatrix& entries) {
 
 }  // namespace
 
-PlaybackBasis::PlaybackBasis(const MotionSpace& space, int functions)
-    : functions_(functions < 0 ? space.functions() : std::min(functions, space.functions())),
-      points_(space.points()),
-      blocks_((functions_ + 1 + lanes - 1) / lanes),
+PlaybackBasis::PlaybackBasis(const RegisteredSpace& space, int levels)
+    : levels_(levels < 0 ? space.levels() : std::min(levels, space.levels())),
       by_component_(space.options().grouping != Grouping::per_joint_component),
-      one_velocity_group_(space.group_of(0) == space.group_of(1)) {
-  for (int c = 0; c < space.curves(); ++c) group_of_.push_back(space.group_of(c));
+      one_velocity_group_(space.plain().group_of(0) == space.plain().group_of(1)) {
+  for (int c = 0; c < space.curves(); ++c) group_of_.push_back(space.plain().group_of(c));
+  for (std::size_t set = 0; set < space.sets().size(); ++set) {
+    sets_.push_back(space.has(static_cast<int>(set)) ? tables_of(space.sets()[set]) : Set{});
+  }
+}
+
+PlaybackBasis::Set PlaybackBasis::tables_of(const MotionSpace& space) const {
+  Set out{.points = space.points()};
+  for (int level = 0; level <= levels_; ++level) out.rows_at.push_back(space.rows_at(level));
+  out.rows = out.rows_at.back();
+  out.blocks = (out.rows + 1 + lanes - 1) / lanes;
+  const bool pinned = space.options().pinned;
   for (const FunctionGroup& group : space.groups()) {
-    const SampleMatrix cubics = cell_coefficients(entries_of(group, functions_));
-    for (int block = 0; block < blocks_; ++block) append(cubics, block, values_);
+    const SampleMatrix cubics = cell_coefficients(entries_of(group, pinned, out.rows));
+    for (int block = 0; block < out.blocks; ++block) append(cubics, block, out.values);
   }
   for (int axis = 0; axis < (one_velocity_group_ ? 1 : 3); ++axis) {
     const FunctionGroup& group = space.groups()[static_cast<std::size_t>(space.group_of(axis))];
-    const std::vector<SampleMatrix> integrals = integrals_of(entries_of(group, functions_));
+    const std::vector<SampleMatrix> integrals = integrals_of(entries_of(group, pinned, out.rows));
     std::vector<SampleMatrix> cubics;
     for (const SampleMatrix& integral : integrals) cubics.push_back(cell_coefficients(integral));
-    for (int block = 0; block < blocks_; ++block) {
-      for (Eigen::Index cell = 0; cell + 1 < points_; ++cell) {
-        for (const SampleMatrix& c : cubics) append(c.middleRows(4 * cell, 4), block, integrals_);
+    for (int block = 0; block < out.blocks; ++block) {
+      for (Eigen::Index cell = 0; cell + 1 < out.points; ++cell) {
+        for (const SampleMatrix& c : cubics) append(c.middleRows(4 * cell, 4), block, out.integrals);
       }
-      for (const SampleMatrix& integral : integrals) append(integral.bottomRows(1), block, ends_);
+      for (const SampleMatrix& integral : integrals) append(integral.bottomRows(1), block, out.ends);
     }
   }
+  return out;
 }
 
 }  // namespace kinespace

@@ -226,8 +226,9 @@ PlayerParts::Place PlayerParts::place_in(std::size_t index, double own) const {
     const double d1 = change - static_cast<double>(p[3]) / inverse_cells;
     s = static_cast<double>(p[0]) + t * (change + (1 - t) * (d0 * (1 - t) + d1 * t));
   }
-  const double x = s * (basis->points() - 1);
-  const int cell = std::clamp(static_cast<int>(x), 0, basis->points() - 2);
+  const int points = basis->points(sequence.set);
+  const double x = s * (points - 1);
+  const int cell = std::clamp(static_cast<int>(x), 0, points - 2);
   return {.sequence = index, .own = own, .cell = cell, .b = static_cast<float>(x - cell)};
 }
 
@@ -285,7 +286,7 @@ int Player::joints() const {
   return parts_->joints;
 }
 int Player::functions() const {
-  return parts_->basis->functions();
+  return parts_->basis->levels();
 }
 
 Eigen::Vector3f Player::pose(double time_s, int functions, std::span<float> rotations) const {
@@ -295,17 +296,18 @@ Eigen::Vector3f Player::pose(double time_s, int functions, std::span<float> rota
   assert(rotations.size() >= 4 * static_cast<std::size_t>(parts.joints));
   const PlayerParts::Place place = parts.place_at(time_s);
   const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
+  const int level = parts.level(functions);
   PoseJob job;
-  job.functions = parts.level(functions);
+  job.functions = basis.rows_at(sequence.set, level);
   job.scores = parts.scores.data() + sequence.scores;
   job.score_stride = static_cast<std::ptrdiff_t>(parts.score_stride());
-  job.values_stride = basis.values_stride();
-  job.integrals_stride = basis.integrals_stride();
+  job.values_stride = basis.values_stride(sequence.set);
+  job.integrals_stride = basis.integrals_stride(sequence.set);
   job.b = place.b;
-  for (int q = 0; q < 4; ++q) job.values[q] = basis.values(basis.group_of(3 + q), 0, place.cell);
+  for (int q = 0; q < 4; ++q) job.values[q] = basis.values(sequence.set, basis.group_of(3 + q), 0, place.cell);
   for (int axis = 0; axis < 3; ++axis) {
-    job.integrals[axis] = basis.integrals(axis, 0, place.cell);
-    job.ends[axis] = basis.ends(axis, 0);
+    job.integrals[axis] = basis.integrals(sequence.set, axis, 0, place.cell);
+    job.ends[axis] = basis.ends(sequence.set, axis, 0);
   }
   job.warp = sequence.warp.data();
   job.warp_terms = PlayerParts::warp_terms(sequence);
@@ -314,7 +316,7 @@ Eigen::Vector3f Player::pose(double time_s, int functions, std::span<float> rota
   job.travel = sequence.travel.data();
   job.joint_lanes = parts.lanes;
   job.joints = parts.joints;
-  add_cut_parts(parts, place, job.functions, job.cuts);
+  add_cut_parts(parts, place, level, job.cuts);
   job.rotations = rotations.data();
   play(job);
   parts.turn_root(rotations.data());
@@ -330,13 +332,14 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
   const PlayerParts::Place place = parts.place_at(time_s);
   const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
   const int level = parts.level(functions);
+  const int rows = basis.rows_at(sequence.set, level);
   CutPart cuts[2];
   add_cut_parts(parts, place, level, cuts);
   const auto cubic = [&](const float* c) {
     return c[0] + place.b * (c[lanes] + place.b * (c[2 * lanes] + place.b * c[3 * lanes]));
   };
   const auto value = [&](int curve, int k) {
-    return cubic(basis.values(basis.group_of(curve), k / lanes, place.cell) + k % lanes);
+    return cubic(basis.values(sequence.set, basis.group_of(curve), k / lanes, place.cell) + k % lanes);
   };
 
   const auto own = static_cast<float>(place.own);
@@ -344,12 +347,12 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
   float from_start[3];
   for (int axis = 0; axis < 3; ++axis) {
     float sum = own * sequence.travel[static_cast<std::size_t>(axis)];
-    for (int k = 0; k <= level; ++k) {
+    for (int k = 0; k <= rows; ++k) {
       float weight = 0;
       for (int j = 0; j < PlayerParts::warp_terms(sequence); ++j) {
-        const float integral = cubic(basis.integrals(axis, k / lanes, place.cell) + 4 * j * lanes + k % lanes);
+        const float integral = cubic(basis.integrals(sequence.set, axis, k / lanes, place.cell) + 4 * j * lanes + k % lanes);
         weight += sequence.warp[static_cast<std::size_t>(j)] * sequence.duration_s *
-                  (integral - own * basis.ends(axis, k / lanes)[j * lanes + k % lanes]);
+                  (integral - own * basis.ends(sequence.set, axis, k / lanes)[j * lanes + k % lanes]);
       }
       sum += weight * (k == 0 ? 1.0F
                               : scores[static_cast<std::size_t>(k - 1) * parts.score_stride() +
@@ -368,7 +371,7 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
       const int curve = 3 + 4 * joint + component;
       const auto column = static_cast<std::size_t>(component * parts.lanes + joint);
       float sum = value(curve, 0);
-      for (int k = 1; k <= level; ++k) {
+      for (int k = 1; k <= rows; ++k) {
         sum += value(curve, k) * scores[static_cast<std::size_t>(k - 1) * parts.score_stride() + column];
       }
       for (const CutPart& cut : cuts) {
@@ -402,7 +405,7 @@ void evaluate(const float* cubic, float b, float factor, float* out) {
   }
 }
 
-// A sequence of a run at one level of detail, which grows function by function: [frame][column] as in
+// A sequence of a run at one level of detail, which grows level by level: [frame][column] as in
 // PlayerParts::cuts, the root's place last.
 class GrowingSequence {
  public:
@@ -423,24 +426,28 @@ class GrowingSequence {
                                             std::max(1, sequence_.intervals);
       }
     }
-    grow(0);
+    add_entry(0);
   }
 
-  // Adds entry k: the mean for 0, the k-th function.
-  void grow(int k) {
+  void grow_to(int level) {
+    const int rows = parts_.basis->rows_at(sequence_.set, level);
+    while (entries_ < rows) add_entry(++entries_);
+  }
+  [[nodiscard]] const SampleMatrix& frames() const { return frames_; }
+
+ private:
+  // Entry 0 is the mean.
+  void add_entry(int k) {
     for (int c = 0; c < parts_.basis->curves(); ++c) {
       const float score = k == 0 ? 1.0F : score_of(c, k);
       const Weights& weights = weights_[static_cast<std::size_t>(shared(c))];
-      const auto padded = static_cast<std::size_t>(parts_.basis->padded());
+      const auto padded = static_cast<std::size_t>(parts_.basis->padded(sequence_.set));
       for (Eigen::Index f = 0; f < frames_.rows(); ++f) {
         frames_(f, column(c)) +=
             static_cast<double>(weights[static_cast<std::size_t>(f) * padded + static_cast<std::size_t>(k)] * score);
       }
     }
   }
-  [[nodiscard]] const SampleMatrix& frames() const { return frames_; }
-
- private:
   [[nodiscard]] Eigen::Index place_column() const { return static_cast<Eigen::Index>(parts_.rotation_floats()); }
   [[nodiscard]] Eigen::Index column(int c) const {
     if (c < 3) return place_column() + c;
@@ -462,11 +469,12 @@ class GrowingSequence {
     if (shared(c) != c) return;
     const PlaybackBasis& basis = *parts_.basis;
     Weights& out = weights_[static_cast<std::size_t>(c)];
-    out.resize(out.size() + static_cast<std::size_t>(basis.padded()), 0.0F);
-    float* row = out.data() + out.size() - basis.padded();
-    for (int block = 0; block < basis.blocks(); ++block, row += PlaybackBasis::lanes) {
+    const int padded = basis.padded(sequence_.set);
+    out.resize(out.size() + static_cast<std::size_t>(padded), 0.0F);
+    float* row = out.data() + out.size() - padded;
+    for (int block = 0; block < basis.blocks(sequence_.set); ++block, row += PlaybackBasis::lanes) {
       if (c >= 3) {
-        evaluate(basis.values(basis.group_of(c), block, place.cell), place.b, 1, row);
+        evaluate(basis.values(sequence_.set, basis.group_of(c), block, place.cell), place.b, 1, row);
       } else {
         add_integrals(place, c, block, row);
       }
@@ -477,14 +485,15 @@ class GrowingSequence {
     const auto own = static_cast<float>(place.own);
     for (int j = 0; j < PlayerParts::warp_terms(sequence_); ++j) {
       const float factor = sequence_.warp[static_cast<std::size_t>(j)] * sequence_.duration_s;
-      evaluate(parts_.basis->integrals(axis, block, place.cell) + 4 * j * lanes, place.b, factor, row);
-      const float* ends = parts_.basis->ends(axis, block) + j * lanes;
+      evaluate(parts_.basis->integrals(sequence_.set, axis, block, place.cell) + 4 * j * lanes, place.b, factor, row);
+      const float* ends = parts_.basis->ends(sequence_.set, axis, block) + j * lanes;
       for (int k = 0; k < lanes; ++k) row[k] -= factor * own * ends[k];
     }
   }
 
   const PlayerParts& parts_;
   const PlayerParts::Sequence& sequence_;
+  int entries_ = 0;  // that were added behind the mean
   std::vector<Weights> weights_;  // by curve; empty where shared with an earlier one
   SampleMatrix frames_;
 };
@@ -511,6 +520,11 @@ PlayerParts::PlayerParts(std::shared_ptr<const PlaybackBasis> basis_in, const En
                                        .found = fmt::format("a clip of {} curves", encoded.scores.cols()),
                                        .expected = fmt::format("{}, as the motion space has", basis->curves())});
       }
+      if (!basis->has(encoded.cycles)) {
+        throw Error(ErrorKind::usage, {.file = clip.name,
+                                       .found = fmt::format("a sequence of {} cycles", encoded.cycles),
+                                       .expected = "sequences that the motion space has functions for"});
+      }
       add_sequence(encoded, clip.rate_hz, start);
       start += encoded.travel.cast<double>();
     }
@@ -525,7 +539,7 @@ PlayerParts::PlayerParts(std::shared_ptr<const PlaybackBasis> basis_in, const En
 }
 
 void PlayerParts::add_sequence(const EncodedSequence& encoded, double rate, const Eigen::Vector3d& start) {
-  Sequence out{.first = encoded.first, .intervals = encoded.last - encoded.first};
+  Sequence out{.first = encoded.first, .intervals = encoded.last - encoded.first, .set = encoded.cycles};
   out.start = start;
   out.warped = !encoded.warp.is_identity();
   out.duration_s = static_cast<float>(out.intervals / rate);
@@ -545,9 +559,9 @@ void PlayerParts::add_sequence(const EncodedSequence& encoded, double rate, cons
   }
   scores.resize((scores.size() + PlaybackBasis::lanes - 1) / PlaybackBasis::lanes * PlaybackBasis::lanes, 0.0F);
   out.scores = scores.size();
-  const Eigen::Index functions = basis->functions();
-  scores.resize(scores.size() + static_cast<std::size_t>(functions) * score_stride(), 0.0F);
-  const Eigen::Index known = std::min(functions, encoded.scores.rows());
+  const Eigen::Index rows = basis->rows(out.set);
+  scores.resize(scores.size() + static_cast<std::size_t>(rows) * score_stride(), 0.0F);
+  const Eigen::Index known = std::min(rows, encoded.scores.rows());
   for (Eigen::Index k = 0; k < known; ++k) {
     float* row = scores.data() + out.scores + static_cast<std::size_t>(k) * score_stride();
     for (Eigen::Index axis = 0; axis < 3; ++axis)
@@ -562,7 +576,7 @@ void PlayerParts::add_sequence(const EncodedSequence& encoded, double rate, cons
 // The corrections at the cuts between sequences first .. last - 1 of one run, at every level.
 void PlayerParts::add_cuts(std::size_t first, std::size_t last) {
   if (last - first < 2) return;
-  const auto levels = static_cast<std::size_t>(basis->functions()) + 1;
+  const auto levels = static_cast<std::size_t>(basis->levels()) + 1;
   const std::size_t start = cuts.size();
   const std::size_t size = levels * cut_stride();
   cuts.resize(start + (last - first - 1) * size, 0.0F);
@@ -576,10 +590,8 @@ void PlayerParts::add_cuts(std::size_t first, std::size_t last) {
     GrowingSequence left(*this, i);
     GrowingSequence right(*this, i + 1);
     for (std::size_t level = 0; level < levels; ++level) {
-      if (level > 0) {
-        left.grow(static_cast<int>(level));
-        right.grow(static_cast<int>(level));
-      }
+      left.grow_to(static_cast<int>(level));
+      right.grow_to(static_cast<int>(level));
       const CutCorrection correction = cut_correction(left.frames(), right.frames(), options.join.free_change);
       float* out = cuts.data() + sequences[i].cut + level * cut_stride();
       const auto columns = static_cast<Eigen::Index>(rotation_floats());
@@ -603,7 +615,7 @@ void PlayerParts::index_times() {
 Player::Player(std::shared_ptr<const PlaybackBasis> basis, const EncodedClip& clip, const PlayerOptions& options)
     : parts_(std::make_shared<const PlayerParts>(std::move(basis), clip, options)) {}
 
-Player::Player(const MotionSpace& space, const EncodedClip& clip, const PlayerOptions& options)
+Player::Player(const RegisteredSpace& space, const EncodedClip& clip, const PlayerOptions& options)
     : Player(std::make_shared<const PlaybackBasis>(space), clip, options) {}
 
 }  // namespace kinespace

@@ -38,14 +38,14 @@ class Player {
  public:
   // `clip` must be in the space of the basis. Throws Error{usage} when it has other curves.
   Player(std::shared_ptr<const PlaybackBasis> basis, const EncodedClip& clip, const PlayerOptions& options = {});
-  Player(const MotionSpace& space, const EncodedClip& clip, const PlayerOptions& options = {});
+  Player(const RegisteredSpace& space, const EncodedClip& clip, const PlayerOptions& options = {});
 
   [[nodiscard]] double duration_s() const;
   [[nodiscard]] int joints() const;
   [[nodiscard]] int functions() const;
 
-  // The pose at a time in seconds from the clip's first frame, with the first `functions` functions (all when < 0 or
-  // too large). `rotations`: 4 * joints() floats, w x y z of each of Skeleton::rotating_joints() in its parent's frame,
+  // The pose at a time in seconds from the clip's first frame, at level of detail `functions` (all when < 0 or too
+  // large). `rotations`: 4 * joints() floats, w x y z of each of Skeleton::rotating_joints() in its parent's frame,
   // the travel root first, whose orientation is that in the world. Returns the world position of the travel root in cm.
   Eigen::Vector3f pose(double time_s, int functions, std::span<float> rotations) const;
 

@@ -86,7 +86,7 @@ std::optional<PlannedTransition> plan_transition(LibraryView& library, std::span
   }
   const std::vector<ClipRow> rows = clips_of_one_tree(library, clips);
   for (const ClipRow& row : rows) require_length(library, row, options.graph.connection.shortest_s);
-  const MotionSpace& motions = library.space(rows.front().space_id);
+  const MotionSpace& motions = library.space(rows.front().space_id).plain();
   const Skeleton& skeleton = library.skeleton(rows.front().skeleton_id);
   const ConnectionSpace space(motions, options.graph.connection);
 

@@ -22,7 +22,7 @@ struct SampledStretch {
   WindowSamples samples;
 };
 
-void sample_clip(const MotionSpace& space, const EncodedClip& encoded, std::size_t clip, const WindowOptions& options,
+void sample_clip(const RegisteredSpace& space, const EncodedClip& encoded, std::size_t clip, const WindowOptions& options,
                  std::vector<SampledStretch>& out) {
   const ClipCurves curves = decode(space, encoded);
   for (const EncodedRun& run : encoded.runs) {
@@ -37,7 +37,7 @@ void sample_clip(const MotionSpace& space, const EncodedClip& encoded, std::size
 // The library is read by one thread, the clips are decoded by all.
 std::vector<SampledStretch> sample_clips(LibraryView& library, std::int64_t space_id, const std::vector<ClipRow>& clips,
                                          const WindowOptions& options, const Progress& progress) {
-  const MotionSpace& space = library.space(space_id);
+  const RegisteredSpace& space = library.space(space_id);
   std::vector<SampledStretch> out;
   for (std::size_t start = 0; start < clips.size(); start += clips_per_block) {
     progress.check_stop();
@@ -102,7 +102,7 @@ WindowIndex WindowIndex::build(LibraryView& library, std::int64_t space_id, cons
     rows += s.samples.rows() - options.samples() + 1;
     samples.push_back(std::move(s.samples));
   }
-  const MotionSpace& motions = library.space(space_id);
+  const MotionSpace& motions = library.space(space_id).plain();
   WindowSpace space = WindowSpace::fit(samples, motions.skeleton(), motions.references(), options);
   progress.at("index", 0.7);
   RowMatrix<float> vectors(rows, space.dimensions());

@@ -43,20 +43,42 @@ Eigen::MatrixXd get_matrix(ByteReader& in, Eigen::Index rows, Eigen::Index cols)
   return out;
 }
 
-Bytes group_section(const FunctionGroup& group, const CurveMoments& moments) {
+// Column by column, from the diagonal down.
+Eigen::MatrixXd lower_triangle(const Eigen::MatrixXd& m) {
+  Eigen::MatrixXd out(m.rows() * (m.rows() + 1) / 2, 1);
+  Eigen::Index at = 0;
+  for (Eigen::Index c = 0; c < m.cols(); ++c) {
+    out.col(0).segment(at, m.rows() - c) = m.col(c).tail(m.rows() - c);
+    at += m.rows() - c;
+  }
+  return out;
+}
+
+Eigen::MatrixXd from_lower_triangle(const Eigen::VectorXd& values, Eigen::Index points) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(points, points);
+  Eigen::Index at = 0;
+  for (Eigen::Index c = 0; c < points; ++c) {
+    out.col(c).tail(points - c) = values.segment(at, points - c);
+    at += points - c;
+  }
+  return out;
+}
+
+Bytes group_section(const FunctionGroup& group, const CurveMoments& moments, bool pinned) {
   ByteWriter out;
   put_varint(out, static_cast<std::uint64_t>(group.functions.cols()));
   put_varint(out, static_cast<std::uint64_t>(moments.count()));
   out.put(group.variance);
+  if (pinned) out.put(group.left);
   put_matrix(out, group.mean);
   put_matrix(out, group.eigenvalues);
   put_matrix(out, group.functions);
   put_matrix(out, moments.mean());
-  put_matrix(out, moments.scatter());
+  put_matrix(out, pinned ? lower_triangle(moments.scatter()) : moments.scatter());
   return std::move(out).take();
 }
 
-std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> bytes, int points,
+std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> bytes, int points, bool pinned,
                                                    const std::string& source) {
   ByteReader in(bytes, source);
   const std::uint64_t functions = get_varint(in);
@@ -67,11 +89,14 @@ std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> by
   const auto count = static_cast<std::int64_t>(get_varint(in) & 0x7fffffffffffffffU);
   FunctionGroup group;
   group.variance = in.get<double>();
+  if (pinned) group.left = in.get<double>();
   group.mean = get_matrix(in, points, 1);
   group.eigenvalues = get_matrix(in, k, 1);
   group.functions = get_matrix(in, points, k);
+  if (!pinned) group.left = group.variance - group.eigenvalues.sum();
   const Eigen::VectorXd mean = get_matrix(in, points, 1);
-  const Eigen::MatrixXd scatter = get_matrix(in, points, points);
+  const Eigen::MatrixXd scatter = pinned ? from_lower_triangle(get_matrix(in, points * (points + 1) / 2, 1), points)
+                                         : get_matrix(in, points, points);
   in.expect_end();
   return {std::move(group), CurveMoments(count, mean, scatter)};
 }
@@ -84,26 +109,46 @@ float stored_steps(float score) {
   return static_cast<float>(std::round(static_cast<double>(score) / score_step));
 }
 
-// One function's scores of all sequences of a clip, in steps, as whole floats: their low bytes are zero and pack well.
-Bytes score_block(const std::vector<const EncodedSequence*>& sequences, Eigen::Index function) {
-  std::vector<float> steps;
-  for (const EncodedSequence* s : sequences) {
-    for (Eigen::Index c = 0; c < s->scores.cols(); ++c) {
-      steps.push_back(stored_steps(s->scores(function, c)));
-    }
-  }
-  return pack_floats(steps);
-}
-
-std::vector<const EncodedSequence*> sequences_of(const EncodedClip& clip) {
-  std::vector<const EncodedSequence*> out;
-  for (const EncodedRun& run : clip.runs) {
-    for (const EncodedSequence& s : run.sequences) out.push_back(&s);
-  }
+// The rows of a sequence's scores that a level of detail has and the one before it has not. A row that the sequence
+// before holds is not kept again: row 0 of a pinned space, but for the first sequence of a run.
+struct RowRange {
+  int first = 0;
+  int last = 0;  // behind it
+};
+RowRange rows_of_level(const MotionSpace& set, int level, bool shares_start) {
+  RowRange out{level == 1 ? 0 : set.rows_at(level - 1), set.rows_at(level)};
+  if (shares_start && set.options().pinned && out.first == 0) ++out.first;
   return out;
 }
 
-Bytes pack_sequences(const EncodedClip& clip) {
+// Visits the rows that a level has of all sequences: all first ones, then all second ones, and so on.
+template <typename Clip, typename Visit>
+void for_each_row(Clip& clip, const RegisteredSpace& space, int level, const Visit& visit) {
+  bool more = true;
+  for (int i = 0; more; ++i) {
+    more = false;
+    for (auto& run : clip.runs) {
+      for (std::size_t k = 0; k < run.sequences.size(); ++k) {
+        auto& sequence = run.sequences[k];
+        const RowRange rows = rows_of_level(space.of(sequence.cycles), level, k > 0);
+        if (rows.first + i < rows.last) visit(sequence, rows.first + i);
+        more = more || rows.first + i + 1 < rows.last;
+      }
+    }
+  }
+}
+
+// One level's scores of all sequences of a clip, in steps, as whole floats: their low bytes are zero and pack well.
+// Row by row over the sequences that have one, so that like stands with like.
+Bytes score_block(const EncodedClip& clip, const RegisteredSpace& space, int level) {
+  std::vector<float> steps;
+  for_each_row(clip, space, level, [&](const EncodedSequence& s, int row) {
+    for (Eigen::Index c = 0; c < s.scores.cols(); ++c) steps.push_back(stored_steps(s.scores(row, c)));
+  });
+  return pack_floats(steps);
+}
+
+Bytes pack_sequences(const EncodedClip& clip, bool kinds) {
   ByteWriter out;
   put_varint(out, clip.runs.size());
   for (const EncodedRun& run : clip.runs) {
@@ -111,14 +156,16 @@ Bytes pack_sequences(const EncodedClip& clip) {
     put_varint(out, static_cast<std::uint64_t>(run.sequences.front().first));
     for (const EncodedSequence& s : run.sequences) {
       put_varint(out, static_cast<std::uint64_t>(s.last - s.first));
+      if (kinds) out.put(static_cast<std::uint8_t>(s.cycles));
       for (const std::int8_t a : s.warp.coefficients()) out.put(a);
     }
   }
   return std::move(out).take();
 }
 
-// Runs and sequences without their scores. Together they must hold the frames of the clip once.
-void unpack_sequences(ByteReader in, EncodedClip& clip) {
+// Runs and sequences without their scores. Together they must hold the frames of the clip once. `kinds`: whether each
+// says how many cycles it holds.
+void unpack_sequences(ByteReader in, const RegisteredSpace& space, bool kinds, EncodedClip& clip) {
   const std::size_t runs = get_count(in, 2, "runs");
   std::int64_t next = 0;
   for (std::size_t r = 0; r < runs; ++r) {
@@ -132,11 +179,16 @@ void unpack_sequences(ByteReader in, EncodedClip& clip) {
       const std::uint64_t length = get_varint(in);
       if (length > static_cast<std::uint64_t>(clip.frames))
         in.fail("a sequence beyond the clip's end", "frames of the clip");
+      const int cycles = kinds ? in.get<std::uint8_t>() : 0;
+      if (!space.has(cycles)) {
+        in.fail(fmt::format("a sequence of {} cycles", cycles), "a kind of sequence that the space has functions for");
+      }
       Warp::Coefficients coefficients{};
       for (std::int8_t& a : coefficients) a = in.get<std::int8_t>();
       if (!Warp::legal(coefficients)) in.fail("a time warp that is not monotone", "slopes within [1/2, 2]");
       EncodedSequence s{.first = static_cast<int>(at),
                         .last = static_cast<int>(at + static_cast<std::int64_t>(length)),
+                        .cycles = cycles,
                         .warp = Warp(coefficients)};
       at = s.last;
       if (at >= clip.frames || (length == 0 && count > 1))
@@ -147,6 +199,27 @@ void unpack_sequences(ByteReader in, EncodedClip& clip) {
   }
   if (next != clip.frames) in.fail(fmt::format("sequences of {} frames", next), fmt::format("{} frames", clip.frames));
   in.expect_end();
+}
+
+void read_level(std::span<const std::byte> block, const RegisteredSpace& space, int level, const std::string& source,
+                EncodedClip& clip) {
+  std::size_t rows = 0;
+  for_each_row(clip, space, level, [&](EncodedSequence&, int) { ++rows; });
+  const auto curves = static_cast<std::size_t>(space.curves());
+  const std::vector<float> steps = unpack_floats(block, rows * curves, source);
+  std::size_t at = 0;
+  for_each_row(clip, space, level, [&](EncodedSequence& s, int number) {
+    auto row = s.scores.row(number);
+    row = Eigen::Map<const Eigen::RowVectorXf>(steps.data() + at, row.size()) * static_cast<float>(score_step);
+    if (!row.allFinite()) throw Error(ErrorKind::bad_input, {.file = source, .found = "a score that is no number"});
+    at += curves;
+  });
+  if (level > 1 || !space.options().pinned) return;
+  for (EncodedRun& run : clip.runs) {
+    for (std::size_t i = 1; i < run.sequences.size(); ++i) {
+      run.sequences[i].scores.row(0) = run.sequences[i - 1].scores.row(1);
+    }
+  }
 }
 
 Bytes pack_side(const EncodedClip& clip) {
@@ -236,12 +309,14 @@ Bytes pack_space(const MotionSpace& space) {
   out.set_option("variance_share", space.options_.variance_share);
   if (space.options_.functions) out.set_option("functions", static_cast<std::int64_t>(*space.options_.functions));
   out.set_option("smooth", static_cast<std::int64_t>(space.options_.smooth ? 1 : 0));
+  if (space.options_.pinned) out.set_option("pinned", std::int64_t{1});
+  if (space.options_.cycles > 0) out.set_option("cycles", static_cast<std::int64_t>(space.options_.cycles));
   out.add_section("skeleton", pack_skeleton(space.skeleton_));
   ByteWriter references;
   put_matrix(references, space.references_);
   out.add_section("references", std::move(references).take());
   for (std::size_t g = 0; g < space.groups_.size(); ++g) {
-    out.add_section(group_name(g), group_section(space.groups_[g], space.moments_[g]));
+    out.add_section(group_name(g), group_section(space.groups_[g], space.moments_[g], space.options_.pinned));
   }
   return out.finish();
 }
@@ -258,28 +333,84 @@ MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& so
     options.functions = static_cast<int>(stream.integer_option("functions", 1, most_points));
   }
   options.smooth = stream.integer_option("smooth", 0, 1) == 1;
+  if (stream.find_option("pinned") != nullptr) options.pinned = stream.integer_option("pinned", 0, 1) == 1;
+  if (stream.find_option("cycles") != nullptr) options.cycles = static_cast<int>(stream.integer_option("cycles", 0, 8));
   MotionSpace space(unpack_skeleton(stream.section("skeleton"), source), options, points);
   ByteReader references(stream.section("references"), source);
   space.set_references(get_matrix(references, 4, space.layout().joint_count()));
   references.expect_end();
   for (int g = 0; g < space.group_count(); ++g) {
-    auto [group, moments] = parse_group(stream.section(group_name(static_cast<std::size_t>(g))), points, source);
+    auto [group, moments] =
+        parse_group(stream.section(group_name(static_cast<std::size_t>(g))), points, options.pinned, source);
     space.groups_.push_back(std::move(group));
     space.moments_.push_back(std::move(moments));
   }
   return space;
 }
 
-PackedClip pack_clip(const EncodedClip& clip, const MotionSpace& space) {
+namespace {
+
+std::string set_name(std::size_t cycles) {
+  return fmt::format("cycles {}", cycles);
+}
+
+}  // namespace
+
+// The set of sequences cut at rests as it ever was; the others, each whole, behind it.
+Bytes pack_space(const RegisteredSpace& space) {
+  BitstreamWriter out("registered-space");
+  out.set_option("warped", static_cast<std::int64_t>(space.warped() ? 1 : 0));
+  for (std::size_t cycles = 0; cycles < space.sets().size(); ++cycles) {
+    if (space.has(static_cast<int>(cycles))) out.add_section(set_name(cycles), pack_space(space.sets()[cycles]));
+  }
+  return out.finish();
+}
+
+RegisteredSpace unpack_registered_space(std::span<const std::byte> bytes, const std::string& source) {
+  const Bitstream stream = Bitstream::parse(bytes, source);
+  if (stream.kind() == "motion-space") {  // of before sequences had kinds; its warps were found without a trial
+    RegisteredSpace out(unpack_space(bytes, source));
+    out.set_warped(true);
+    return out;
+  }
+  stream.require_kind("registered-space");
+  std::vector<MotionSpace> sets{unpack_space(stream.section(set_name(0)), source)};
+  for (std::size_t cycles = 1; cycles <= 8; ++cycles) {
+    if (!stream.has_section(set_name(cycles))) continue;
+    MotionSpace set = unpack_space(stream.section(set_name(cycles)), source);
+    const bool alike = set.skeleton().same_tree(sets.front().skeleton()) && set.options().cycles == static_cast<int>(cycles) &&
+                       set.options().grouping == sets.front().options().grouping &&
+                       set.options().pinned == sets.front().options().pinned;
+    if (!alike) {
+      throw Error(ErrorKind::bad_input, {.file = source,
+                                         .found = "function sets that do not belong together",
+                                         .expected = "one skeleton, one grouping"});
+    }
+    while (sets.size() < cycles) {
+      MotionSpaceOptions none = sets.front().options();
+      none.cycles = static_cast<int>(sets.size());
+      sets.emplace_back(sets.front().skeleton(), none, sets.front().points()).set_references(sets.front().references());
+    }
+    sets.push_back(std::move(set));
+  }
+  RegisteredSpace out(std::move(sets));
+  out.set_warped(stream.integer_option("warped", 0, 1) == 1);
+  return out;
+}
+
+PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   PackedClip out;
   BitstreamWriter vectors("clip-vectors");
-  const auto sequences = sequences_of(clip);
   std::vector<Bytes> blocks;
-  for (Eigen::Index k = 0; k < space.functions(); ++k) blocks.push_back(score_block(sequences, k));
+  for (int level = 1; level <= space.levels(); ++level) blocks.push_back(score_block(clip, space, level));
   vectors.set_error(clip.error);
   vectors.add_progressive_section("scores", blocks);
   out.vectors = vectors.finish();
-  out.warps = one_section("clip-warps", "sequences", pack_sequences(clip));
+  const bool kinds = space.sets().size() > 1;
+  BitstreamWriter warps("clip-warps");
+  if (kinds) warps.set_option("kinds", std::int64_t{1});
+  warps.add_section("sequences", pack_sequences(clip, kinds));
+  out.warps = warps.finish();
   out.side = one_section("clip-side", "side", pack_side(clip));
   return out;
 }
@@ -295,12 +426,13 @@ void round_to_stored(EncodedClip& clip) {
   }
 }
 
-EncodedClip unpack_clip(const PackedClip& packed, const MotionSpace& space, const Skeleton& skeleton,
+EncodedClip unpack_clip(const PackedClip& packed, const RegisteredSpace& space, const Skeleton& skeleton,
                         const EncodedClip& header, const std::string& source, int functions) {
   EncodedClip clip{.name = header.name, .rate_hz = header.rate_hz, .frames = header.frames};
   const Bitstream warps = Bitstream::parse(packed.warps, source);
   warps.require_kind("clip-warps");
-  unpack_sequences(ByteReader(warps.section("sequences"), source), clip);
+  const bool kinds = warps.find_option("kinds") != nullptr && warps.integer_option("kinds", 0, 1) == 1;
+  unpack_sequences(ByteReader(warps.section("sequences"), source), space, kinds, clip);
   const Bitstream side = Bitstream::parse(packed.side, source);
   side.require_kind("clip-side");
   unpack_side(ByteReader(side.section("side"), source), clip, skeleton, source);
@@ -309,30 +441,21 @@ EncodedClip unpack_clip(const PackedClip& packed, const MotionSpace& space, cons
   vectors.require_kind("clip-vectors");
   clip.error = vectors.error();
   auto blocks = vectors.blocks("scores");
-  if (blocks.size() > static_cast<std::size_t>(space.functions())) {
+  if (blocks.size() > static_cast<std::size_t>(space.levels())) {
     throw Error(ErrorKind::bad_input, {.file = source,
-                                       .found = fmt::format("{} functions", blocks.size()),
-                                       .expected = fmt::format("{}, as the space has", space.functions())});
+                                       .found = fmt::format("{} levels of detail", blocks.size()),
+                                       .expected = fmt::format("{}, as the space has", space.levels())});
   }
-  if (functions >= 0 && static_cast<std::size_t>(functions) < blocks.size())
-    blocks.resize(static_cast<std::size_t>(functions));
-  const auto curves = static_cast<std::size_t>(space.curves());
-  const auto count = static_cast<std::size_t>(clip.sequence_count());
+  if (blocks.empty() && space.options().pinned) {
+    throw Error(ErrorKind::bad_input, {.file = source, .found = "no level of detail", .expected = "one at least"});
+  }
+  // Level 0 has the ends, which the first block holds.
+  const std::size_t least = space.options().pinned ? 1 : 0;
+  if (functions >= 0) blocks.resize(std::min(blocks.size(), std::max(least, static_cast<std::size_t>(functions))));
   for (EncodedRun& run : clip.runs) {
-    for (EncodedSequence& s : run.sequences) s.scores = ScoreMatrix::Zero(space.functions(), space.curves());
+    for (EncodedSequence& s : run.sequences) s.scores = ScoreMatrix::Zero(space.of(s.cycles).rows(), space.curves());
   }
-  for (std::size_t k = 0; k < blocks.size(); ++k) {
-    const std::vector<float> steps = unpack_floats(blocks[k], count * curves, source);
-    std::size_t at = 0;
-    for (EncodedRun& run : clip.runs) {
-      for (EncodedSequence& s : run.sequences) {
-        auto row = s.scores.row(static_cast<Eigen::Index>(k));
-        row = Eigen::Map<const Eigen::RowVectorXf>(steps.data() + at, row.size()) * static_cast<float>(score_step);
-        if (!row.allFinite()) throw Error(ErrorKind::bad_input, {.file = source, .found = "a score that is no number"});
-        at += curves;
-      }
-    }
-  }
+  for (std::size_t k = 0; k < blocks.size(); ++k) read_level(blocks[k], space, static_cast<int>(k) + 1, source, clip);
   return clip;
 }
 
@@ -374,6 +497,7 @@ void put_head(ByteWriter& out, const PreparedClip& clip) {
   for (const Run& run : clip.runs) {
     put_varint(out, run.cuts.size());
     for (const int frame : run.cuts) put_varint(out, static_cast<std::uint64_t>(frame));
+    for (int i = 0; i < run.sequence_count(); ++i) put_varint(out, static_cast<std::uint64_t>(run.cycles_of(i)));
   }
   const Bytes skeleton = pack_skeleton(clip.skeleton);
   put_varint(out, skeleton.size());
@@ -403,6 +527,11 @@ PreparedClip get_head(ByteReader& in, const std::string& source, int& frame_coun
     }
     if (cuts == 0) in.fail("a run without frames", "one frame or more");
     if (!std::ranges::is_sorted(run.cuts, std::less_equal<>{})) in.fail("cuts out of order", "ascending frames");
+    for (int i = 0; i < run.sequence_count(); ++i) {
+      const std::uint64_t cycles = get_varint(in);
+      if (cycles > 8) in.fail(fmt::format("a sequence of {} cycles", cycles), "0 to 8");
+      run.cycles.push_back(static_cast<std::uint8_t>(cycles));
+    }
   }
   out.skeleton = unpack_skeleton(get_part(in, "bytes"), source);
   out.curves.side_tracks = unpack_side_tracks(get_part(in, "bytes"), static_cast<int>(frames), out.skeleton, source);

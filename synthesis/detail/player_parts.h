@@ -14,6 +14,7 @@ struct PlayerParts {
   struct Sequence {
     int first = 0;
     int intervals = 0;
+    int set = 0;  // of the basis
     bool warped = false;
     bool joined_before = false;  // begins at a cut
     bool joined_after = false;   // ends at one
@@ -48,7 +49,7 @@ struct PlayerParts {
   float turn_sine = 0;
   std::vector<Sequence> sequences;
   AlignedVector<float> scores;
-  AlignedVector<float> cuts;  // [level 0 .. functions][values 4 lanes, slopes 4 lanes, slopes of the root's place 4]
+  AlignedVector<float> cuts;  // [level 0 .. all][values 4 lanes, slopes 4 lanes, slopes of the root's place 4]
   int bucket = 1;             // frames
   std::vector<int> at;        // the sequence at the first frame of each bucket
 
@@ -60,7 +61,7 @@ struct PlayerParts {
   [[nodiscard]] std::size_t score_stride() const { return rotation_floats() + PlaybackBasis::lanes; }
   [[nodiscard]] std::size_t cut_stride() const { return 2 * rotation_floats() + PlaybackBasis::lanes; }
   [[nodiscard]] int level(int functions) const {
-    return functions < 0 || functions > basis->functions() ? basis->functions() : functions;
+    return functions < 0 || functions > basis->levels() ? basis->levels() : functions;
   }
   // How many of the a_j of a sequence's warp count.
   [[nodiscard]] static int warp_terms(const Sequence& sequence) {
