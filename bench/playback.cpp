@@ -43,7 +43,7 @@ Played load_played(const std::filesystem::path& folder) {
   for (std::size_t i = 0; i < clips.size(); ++i) {
     ClipCurves curves = clips[i].curves;
     out.space.apply_references(curves.values);
-    out.clips.push_back(encode(out.space, curves, clips[i].runs, built.warps[i]));
+    out.clips.push_back(encode(out.space, curves, built.runs_of(static_cast<int>(i), clips[i].runs), built.warps[i]));
     out.players.emplace_back(basis, out.clips.back());
   }
   return out;

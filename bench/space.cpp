@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <vector>
 
 #include <fmt/format.h>
@@ -129,16 +130,8 @@ std::vector<EncodedClip> encode_all(const DataSet& data, const BuiltSpace& built
   tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
     ClipCurves curves = data.prepared[i].curves;
     built.space.apply_references(curves.values);
-    out[i] = encode(built.space, curves, data.prepared[i].runs, built.warps[i]);
+    out[i] = encode(built.space, curves, built.runs_of(static_cast<int>(i), data.prepared[i].runs), built.warps[i]);
   });
-  return out;
-}
-
-// What is left of the curves' variance after n functions, n = 0, 1, ...
-std::vector<double> residual_variance(const MotionSpace& space) {
-  const FunctionGroup& group = space.groups().front();
-  std::vector<double> out{group.variance};
-  for (const double lambda : group.eigenvalues) out.push_back(out.back() - lambda);
   return out;
 }
 
@@ -160,7 +153,7 @@ void level_of_detail_rows(const DataSet& data, const Bars& bars, const Compute& 
   const Figures all = measure(data, built.space, encoded, -1);
   add("mean joint error, 5 functions", five.mean, "cm", bars.at_5);
   add("mean joint error, 10 functions", ten.mean, "cm", bars.at_10);
-  add(fmt::format("mean joint error, all {} functions", built.space.functions()), all.mean, "cm", bars.at_all);
+  add(fmt::format("mean joint error, all {} levels", built.space.levels()), all.mean, "cm", bars.at_all);
   add("worst joint error, 5 functions (" + five.worst_place + ")", five.worst, "cm", {});
   add("worst joint error, 10 functions (" + ten.worst_place + ")", ten.worst, "cm", 15);
   add("jump at cuts, 5 functions", five.jump_ratio, "x p99.9 elsewhere", 1.0);
@@ -168,47 +161,162 @@ void level_of_detail_rows(const DataSet& data, const Bars& bars, const Compute& 
   add("jump at cuts, all functions", all.jump_ratio, "x p99.9 elsewhere", {});
 }
 
+// Numbers a curve and second that a level of detail takes: ends once, and functions.
+double numbers_a_second(const RegisteredSpace& space, const std::vector<EncodedClip>& encoded, int level) {
+  double numbers = 0;
+  double seconds = 0;
+  for (const EncodedClip& clip : encoded) {
+    seconds += clip.frames / clip.rate_hz;
+    for (const EncodedRun& run : clip.runs) {
+      for (const EncodedSequence& s : run.sequences) {
+        const MotionSpace& set = space.of(s.cycles);
+        numbers += set.rows_at(level) - (set.options().pinned ? 1 : 0);
+      }
+    }
+  }
+  return numbers / seconds;
+}
+
+// Mean joint error at so many numbers a second, between the two levels around it (its logarithm by theirs).
+class ErrorCurve {
+ public:
+  ErrorCurve(const DataSet& data, const BuiltSpace& built)
+      : data_(data), space_(built.space), encoded_(encode_all(data, built)) {}
+  [[nodiscard]] double at(double numbers) {
+    int level = 1;
+    while (level < space_.levels() && numbers_a_second(space_, encoded_, level + 1) <= numbers) ++level;
+    const double low = numbers_a_second(space_, encoded_, level);
+    const double high = numbers_a_second(space_, encoded_, level + 1);
+    const double part = high > low ? (numbers - low) / (high - low) : 0;
+    return std::exp((1 - part) * std::log(error(level)) + part * std::log(error(level + 1)));
+  }
+
+ private:
+  [[nodiscard]] double error(int level) {
+    const auto found = known_.find(level);
+    if (found != known_.end()) return found->second;
+    return known_[level] = measure(data_, space_, encoded_, level).mean;
+  }
+  const DataSet& data_;
+  const RegisteredSpace& space_;
+  std::vector<EncodedClip> encoded_;
+  std::map<int, double> known_;
+};
+
+// The data cut otherwise.
+DataSet cut_again(const DataSet& data, const SequenceOptions& options) {
+  DataSet out{data.name, data.clips, std::vector<PreparedClip>(data.clips.size())};
+  tbb::parallel_for(std::size_t{0}, data.clips.size(),
+                    [&](std::size_t i) { out.prepared[i] = prepare(data.clips[i], options); });
+  return out;
+}
+
+// Every clip in equal windows of about that length.
+DataSet cut_windows(const DataSet& data, double length_s) {
+  DataSet out = cut_again(data, {.most_cycles = 0});
+  for (PreparedClip& clip : out.prepared) {
+    const int last = clip.curves.frames() - 1;
+    const auto windows = std::max(1, static_cast<int>(std::lround(last / clip.curves.rate_hz / length_s)));
+    Run run{{0}};
+    for (int i = 1; i <= windows && last > 0; ++i) {
+      run.cuts.push_back(static_cast<int>(std::lround(static_cast<double>(i) * last / windows)));
+    }
+    clip.runs = {std::move(run)};
+  }
+  return out;
+}
+
+// How many numbers a curve of a sequence takes until so much of the curves' variance is left.
+int numbers_needed(const MotionSpace& set, double left_share) {
+  const FunctionGroup& group = set.groups().front();
+  double left = group.left + group.eigenvalues.sum();
+  int numbers = set.options().pinned ? 1 : 0;
+  for (Eigen::Index k = 0; k < group.eigenvalues.size() && left > left_share * group.variance; ++k, ++numbers) {
+    left -= group.eigenvalues(k);
+  }
+  return numbers;
+}
+
+struct MeanLength {
+  double seconds = 0;
+  int sequences = 0;
+  [[nodiscard]] double mean() const { return sequences > 0 ? seconds / sequences : 0; }
+};
+
+MeanLength length_of(const DataSet& data, int cycles) {
+  MeanLength out;
+  for (const PreparedClip& clip : data.prepared) {
+    for (const Run& run : clip.runs) {
+      for (int i = 0; i < run.sequence_count(); ++i) {
+        if (run.cycles_of(i) != cycles) continue;
+        out.seconds += (run.last_frame(i) - run.first_frame(i)) / clip.curves.rate_hz;
+        ++out.sequences;
+      }
+    }
+  }
+  return out;
+}
+
+struct RegistrationBars {
+  std::optional<double> functions_999;
+  std::optional<double> functions_9999;
+  double error = 1;
+};
+
+// What registration is worth: cut at cycles, against as many equal windows (build --no-align).
+void registration_rows(const DataSet& data, const RegistrationBars& bars, const Compute& compute,
+                       BenchReport& report) {
+  const auto add = [&](const std::string& name, double value, const char* unit, std::optional<double> bar) {
+    report.results.push_back({.name = name, .data = data.name, .value = value, .unit = unit, .bar = bar});
+  };
+  SpaceBuildOptions options;
+  const BuiltSpace registered = build_space(source_of(data.prepared), options, compute);
+  options.align = false;
+  const DataSet windows = cut_again(data, {.equal_windows = true});
+  const BuiltSpace plain = build_space(source_of(windows.prepared), options, compute);
+  double cyclic = 0;
+  double all = 0;
+  for (int cycles = 0; cycles <= SequenceOptions{}.most_cycles; ++cycles) {
+    const double seconds = length_of(data, cycles).seconds;
+    all += seconds;
+    if (cycles > 0) cyclic += seconds;
+  }
+  add("share of motion in whole cycles", 100 * cyclic / all, "%", {});
+  const int three = SequenceOptions{}.most_cycles;
+  if (registered.space.has(three)) {
+    const double length = length_of(data, three).mean();
+    const DataSet same_length = cut_windows(data, length);
+    const BuiltSpace held_against = build_space(source_of(same_length.prepared), options, compute);
+    add("mean length of three cycles", length, "s", {});
+    for (const auto& [left, bar] : {std::pair(1e-3, bars.functions_999), std::pair(1e-4, bars.functions_9999)}) {
+      const std::string precision = fmt::format("{:g} of the variance", 1 - left);
+      const int ours = numbers_needed(registered.space.of(three), left);
+      const int theirs = numbers_needed(held_against.space.plain(), left);
+      add("functions for " + precision + ", three whole cycles", ours, "functions", {});
+      add("functions for " + precision + ", equal windows of that length", theirs, "functions", {});
+      add("functions for " + precision + ", cycles over windows", static_cast<double>(ours) / theirs, "x", bar);
+    }
+  }
+  ErrorCurve ours(data, registered);
+  ErrorCurve theirs(windows, plain);
+  for (const double numbers : {3.0, 5.0, 8.0, 12.0, 20.0}) {
+    add(fmt::format("mean joint error at {:g} functions a second, registered over equal windows", numbers),
+        ours.at(numbers) / theirs.at(numbers), "x", bars.error);
+  }
+}
+
 bool is_walk_or_run(const std::string& name) {
   return name.starts_with("walk") || name.starts_with("run");
 }
 
-// Table 1 of the paper: the functions that a precision of 0.9999 takes, with and without alignment (for that
-// precision).
-void alignment_rows(const DataSet& all, const Compute& compute, BenchReport& report) {
+DataSet walks_and_runs(const DataSet& all) {
   DataSet data{all.name + ", walks and runs", {}, {}};
   for (std::size_t i = 0; i < all.clips.size(); ++i) {
     if (!is_walk_or_run(all.clips[i].name)) continue;
     data.clips.push_back(all.clips[i]);
     data.prepared.push_back(all.prepared[i]);
   }
-  SpaceBuildOptions options;
-  options.space.functions = 40;
-  options.align = false;
-  const BuiltSpace plain = build_space(source_of(data.prepared), options, compute);
-  const std::vector<double> before = residual_variance(plain.space);
-  const auto needed = [](const std::vector<double>& left, double most) {
-    return static_cast<int>(std::ranges::find_if(left, [most](double r) { return r <= most; }) - left.begin());
-  };
-  const auto add = [&](const std::string& name, double value, const char* unit, std::optional<double> bar) {
-    report.results.push_back({.name = name, .data = data.name, .value = value, .unit = unit, .bar = bar});
-  };
-  const int without = needed(before, 1e-4 * before.front());
-  add("functions for precision 0.9999, not aligned (paper: 10)", without, "functions", {});
-  options.align = true;
-  options.alignment.functions = std::max(1, without / 2);  // levels of detail n and 2n
-  options.alignment.least_gain = 0.05;
-  const BuiltSpace aligned = build_space(source_of(data.prepared), options, compute);
-  const std::vector<double> after = residual_variance(aligned.space);
-  add("functions for precision 0.9999, aligned (paper: 6)", needed(after, 1e-4 * after.front()), "functions",
-      without - 1.0);
-  for (const int n : {5, 10, without}) {
-    const auto k = static_cast<std::size_t>(n);
-    add(fmt::format("variance left by {} functions, aligned over not", n), after[k] / before[k], "x", {});
-  }
-  add("mean joint error at 10 functions, aligned over not",
-      measure(data, aligned.space, encode_all(data, aligned), 10).mean /
-          measure(data, plain.space, encode_all(data, plain), 10).mean,
-      "x", {});
+  return data;
 }
 
 }  // namespace
@@ -216,10 +324,12 @@ void alignment_rows(const DataSet& all, const Compute& compute, BenchReport& rep
 void space_rows(const BenchOptions& options, const Compute& compute, BenchReport& report) {
   const DataSet bandai = load_data_set("bandai1+bandai2", {options.data / "bandai1", options.data / "bandai2"});
   level_of_detail_rows(bandai, {1.0, 0.25, 0.06}, compute, report);
-  alignment_rows(bandai, compute, report);
+  registration_rows(walks_and_runs(bandai), {0.6, 0.8, 0.8}, compute, report);
+  registration_rows(bandai, {}, compute, report);
   const DataSet cmu =
       load_data_set("cmu 01-03", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
   level_of_detail_rows(cmu, {0.75, 0.40, 0.10}, compute, report);
+  registration_rows(cmu, {}, compute, report);
 }
 
 }  // namespace kinespace

@@ -23,6 +23,17 @@ struct ExportOptions {
   bool json = false;
 };
 
+// Of the level that is played, or of the nearest coarser one that was measured.
+void add_measured_error(const EncodedClip& clip, int level, Json& result) {
+  const LevelError* known = nullptr;
+  for (const LevelError& l : clip.levels) {
+    if (l.level <= level) known = &l;
+  }
+  result["mean_joint_error_cm"] = known ? Json(known->error.mean_joint_error_cm) : Json();
+  result["max_joint_error_cm"] = known ? Json(known->error.max_joint_error_cm) : Json();
+  if (known && known->level != level) result["errors_of_level"] = known->level;
+}
+
 void run_export(const ExportOptions& options, Session& session) {
   static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
   LibraryView library(options.library);
@@ -35,7 +46,8 @@ void run_export(const ExportOptions& options, Session& session) {
     level = library.level_for_error(row, *options.max_error_cm);
     functions = level->functions;
     if (!level->from_the_file) {
-      session.note("the file that the clip came from is not there unchanged: its stored error is added on top");
+      session.note("the file that the clip came from is not there unchanged: errors are those measured when the library "
+                   "was built");
     }
   }
   const EncodedClip encoded = library.encoded(row);
@@ -46,7 +58,11 @@ void run_export(const ExportOptions& options, Session& session) {
               {"frames", row.frames},
               {"functions", functions},
               {"of_functions", space.levels()}};
-  if (level) result["max_joint_error_cm"] = level->max_error_cm;
+  if (level) {
+    result["max_joint_error_cm"] = level->max_error_cm;
+  } else {
+    add_measured_error(encoded, functions, result);
+  }
   options.json ? print_json(result) : print_fields(result);
 }
 

@@ -88,6 +88,49 @@ Json describe_space(LibraryView& view, const SpaceRow& row) {
           {"sets", std::move(sets)}};
 }
 
+Json share_of(const std::optional<double>& part, double whole) {
+  return part && whole > 0 ? Json(*part / whole) : Json();
+}
+
+double cycles_of(const Library& library) {
+  return static_cast<double>(library.metadata_count("cycles").value_or(0));
+}
+
+// Of all clips whose errors are known: frames count alike.
+class LevelTable {
+ public:
+  void add(const EncodedClip& clip) {
+    for (const LevelError& l : clip.levels) {
+      Sum& sum = levels_[l.level];
+      sum.frames += clip.frames;
+      sum.error += l.error.mean_joint_error_cm * clip.frames;
+      if (l.error.max_joint_error_cm > sum.largest) {
+        sum.largest = l.error.max_joint_error_cm;
+        sum.clip = clip.name;
+      }
+    }
+  }
+  [[nodiscard]] Json rows() const {
+    Json out = Json::array();
+    for (const auto& [level, sum] : levels_) {
+      out.push_back({{"functions", level},
+                     {"mean_joint_error_cm", sum.error / sum.frames},
+                     {"max_joint_error_cm", sum.largest},
+                     {"worst_clip", sum.clip}});
+    }
+    return out;
+  }
+
+ private:
+  struct Sum {
+    double frames = 0;
+    double error = 0;
+    double largest = 0;
+    std::string clip;
+  };
+  std::map<int, Sum> levels_;
+};
+
 Json describe_library(const InfoOptions& options, Session& /*session*/) {
   LibraryView view(options.file);
   const Library& library = view.library();
@@ -105,7 +148,9 @@ Json describe_library(const InfoOptions& options, Session& /*session*/) {
     joints = std::max<std::int64_t>(joints, view.space(row.id).skeleton().joint_count());
     height = std::max(height, view.space(row.id).skeleton().rest_height());
   }
+  LevelTable levels;
   for (const ClipRow& row : library.clips()) {
+    levels.add(view.encoded(row, 0));
     rate = std::max(rate, row.rate_hz);
     const auto space = space_at.find(row.space_id);
     clips.push_back({{"name", row.name},
@@ -122,6 +167,10 @@ Json describe_library(const InfoOptions& options, Session& /*session*/) {
           {"sequences", or_null(library.metadata_count("sequences"))},
           {"functions", or_null(library.metadata_count("functions"))},
           {"variance", or_null(library.metadata_number("variance"))},
+          {"movement", or_null(library.metadata_number("movement"))},
+          {"cycles", or_null(library.metadata_count("cycles"))},
+          {"cyclic_share", share_of(library.metadata_number("cyclic_seconds"), totals.seconds)},
+          {"mean_cycle_s", share_of(library.metadata_number("cyclic_seconds"), cycles_of(library))},
           {"frames", totals.frames},
           {"seconds", totals.seconds},
           {"rate_hz", rate},
@@ -132,6 +181,7 @@ Json describe_library(const InfoOptions& options, Session& /*session*/) {
           {"space_bytes", totals.space_bytes},
           {"retrieval_bytes", totals.retrieval_bytes},
           {"spaces", std::move(spaces)},
+          {"levels", levels.rows()},
           {"clip_list", std::move(clips)}};
 }
 

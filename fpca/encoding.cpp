@@ -8,6 +8,7 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/cut_join.h"
+#include "kinespace/fpca/registration.h"
 
 namespace kinespace {
 namespace {
@@ -182,10 +183,9 @@ EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip, const Se
                                        .expected = "the same joint names, parents and channels"});
   }
   ClipCurves curves = clip_curves(clip);
-  const auto usable = [&space](int cycles) { return space.has(cycles); };
-  const std::vector<Run> runs = SequenceCutter(clip, sequences).cut(curves, clip.skeleton, usable);
+  const std::vector<Run> runs = cut_sequences(clip, sequences);
   space.apply_references(curves.values);
-  return encode(space, curves, runs);
+  return encode(space, curves, apply_choice(runs, choose_rests(space, curves.values, runs, curves.rate_hz)));
 }
 
 }  // namespace kinespace

@@ -36,6 +36,12 @@ struct EncodedRun {
   std::vector<EncodedSequence> sequences;           // neighbours share a frame
 };
 
+// How far the joints are from those of the clip as it was read, at a level of detail.
+struct LevelError {
+  int level = 0;
+  MeasuredError error;
+};
+
 // Everything of a clip but its skeleton.
 struct EncodedClip {
   std::string name;
@@ -44,14 +50,16 @@ struct EncodedClip {
   Placement placement;
   std::vector<SideTrack> side_tracks;
   std::vector<EncodedRun> runs;
-  MeasuredError error;  // of decoding with all functions, where it was measured
+  MeasuredError error;             // of decoding with all functions, where it was measured
+  std::vector<LevelError> levels;  // of some levels, ascending, where they were measured
 
   [[nodiscard]] int sequence_count() const;
 };
 
 struct JoinOptions {
   double blend = 0.13;       // of a sequence's length, (0, 0.5]
-  double free_change = 0.3;  // how much of the typical change of slope inside (rms) may stay at a cut; >= 0
+  double free_change = 4;  // how many times the typical change of slope inside (rms) may stay at a cut; >= 0. Cycles are
+                           // cut amid motion, where slopes do change: less would take out what was there
 };
 
 // The curves of a run as splines, ready to be sampled sequence by sequence.

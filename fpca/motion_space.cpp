@@ -88,6 +88,7 @@ void MotionSpaceOptions::validate() const {
     fail(fmt::format("variance_share = {}", variance_share), "a share above 0, up to 1");
   }
   if (functions && (*functions < 1 || *functions > 1024)) fail(fmt::format("functions = {}", *functions), "1 to 1024");
+  if (!(pace >= 1 && pace <= 100)) fail(fmt::format("pace = {}", pace), "1 to 100");
   if (cycles < 0 || cycles > 8) fail(fmt::format("cycles = {}", cycles), "0 to 8");
 }
 
@@ -285,15 +286,16 @@ int MotionSpace::rows() const {
 
 int MotionSpace::rows_at(int n) const {
   if (n < 0) return rows();
-  const std::int64_t numbers = std::int64_t{n} * std::max(1, options_.cycles);  // a curve
-  const std::int64_t wanted = options_.pinned ? std::max<std::int64_t>(2, numbers + 1) : numbers;
-  return static_cast<int>(std::min<std::int64_t>(rows(), wanted));
+  constexpr double rounding = 1e-9;
+  const double numbers = std::ceil(n * options_.pace - rounding);  // a curve
+  const double wanted = options_.pinned ? std::max(2.0, numbers + 1) : numbers;
+  return static_cast<int>(std::min(static_cast<double>(rows()), wanted));
 }
 
 int MotionSpace::levels() const {
-  const int numbers = options_.pinned ? rows() - 1 : rows();
-  const int a_level = std::max(1, options_.cycles);
-  return (numbers + a_level - 1) / a_level;
+  int level = options_.pinned ? 1 : 0;
+  while (rows_at(level) < rows()) ++level;
+  return level;
 }
 
 int MotionSpace::function_count() const {

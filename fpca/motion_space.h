@@ -15,8 +15,8 @@
 //
 //   f_c(s) = (1 - s) f_c(0) + s f_c(1) + mu_g(s) + sum_k  x_kc phi_gk(s),      mu_g, phi_gk = 0 at both ends
 //
-// Its vectors have the two ends as rows 0 and 1. Level of detail n of it takes n numbers a curve: the end, and the first
-// n - 1 functions; n for each cycle, where sequences hold several.
+// Its vectors have the two ends as rows 0 and 1. Level of detail n takes n numbers a curve, in a pinned space an end and
+// the first n - 1 functions; n times `pace` where sequences last so many times as long.
 #pragma once
 
 #include <cstdint>
@@ -49,7 +49,8 @@ struct MotionSpaceOptions {
   std::optional<int> functions;      // ... or a count, 1 .. T
   bool smooth = false;  // smooth mean and covariance and take the noise off (PACE); clean motion needs none
   bool pinned = false;  // the ends of sequences are kept apart
-  int cycles = 0;       // whole cycles that a sequence holds, 0 .. 8; 0: it is no cyclic motion
+  int cycles = 0;       // whole cycles that a sequence holds, 0 .. 8; 0: it was cut at rests
+  double pace = 1;      // numbers a curve that one more level of detail takes, 1 .. 100
 
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;

@@ -17,7 +17,6 @@ void require_option(bool legal, const char* field, double value, const char* ran
   throw Error(ErrorKind::usage, {.found = fmt::format("SequenceOptions::{} = {}", field, value), .expected = range});
 }
 
-using UsableCycles = std::function<bool(int cycles)>;
 
 using Movement = SequenceCutter::Movement;
 
@@ -148,11 +147,10 @@ void cut_at_rests(const Movement& movement, int first, int last, double rate_hz,
 }
 
 // Appends sequences of whole cycles, as many cycles each as may be.
-void cut_cycles(const CyclicStretch& stretch, const SequenceOptions& options, const UsableCycles& usable, Run& run) {
+void cut_cycles(const CyclicStretch& stretch, const SequenceOptions& options, Run& run) {
   const int cycles = stretch.cycles();
   for (int at = 0; at < cycles;) {
-    int held = std::min(options.most_cycles, cycles - at);
-    while (held > 1 && !usable(held)) --held;
+    const int held = std::min(options.most_cycles, cycles - at);
     at += held;
     run.cuts.push_back(stretch.marks[static_cast<std::size_t>(at)]);
     run.cycles.push_back(static_cast<std::uint8_t>(held));
@@ -160,7 +158,7 @@ void cut_cycles(const CyclicStretch& stretch, const SequenceOptions& options, co
 }
 
 Run equal_windows(const Run& run) {
-  Run out{{run.cuts.front()}, {}};
+  Run out{{run.cuts.front()}};
   const int sequences = run.sequence_count();
   const int first = run.cuts.front();
   const int frames = run.cuts.back() - first;
@@ -171,13 +169,17 @@ Run equal_windows(const Run& run) {
 }
 
 Run cut_run(const Movement& movement, const std::vector<CyclicStretch>& stretches, int first, int last, double rate_hz,
-            const SequenceOptions& options, const UsableCycles& usable) {
-  Run run{{first}, {}};
+            const SequenceOptions& options) {
+  Run run{{first}};
   for (const CyclicStretch& stretch : stretches) {
     if (stretch.marks.front() > run.cuts.back()) {
       cut_at_rests(movement, run.cuts.back(), stretch.marks.front(), rate_hz, options, run);
     }
-    cut_cycles(stretch, options, usable, run);
+    const int sequence = static_cast<int>(run.cycles.size());
+    cut_cycles(stretch, options, run);
+    Run at_rests{{stretch.marks.front()}};
+    cut_at_rests(movement, stretch.marks.front(), stretch.marks.back(), rate_hz, options, at_rests);
+    run.at_rests.push_back({sequence, static_cast<int>(run.cycles.size()) - sequence, std::move(at_rests.cuts)});
   }
   if (last > run.cuts.back()) cut_at_rests(movement, run.cuts.back(), last, rate_hz, options, run);
   return options.equal_windows ? equal_windows(run) : run;
@@ -203,16 +205,13 @@ SequenceCutter::SequenceCutter(const Clip& clip, const SequenceOptions& options)
   movement_ = measure_movement(clip, options_);
 }
 
-std::vector<Run> SequenceCutter::cut(const ClipCurves& curves, const Skeleton& skeleton,
-                                     const UsableCycles& usable) const {
-  const UsableCycles may = [&](int cycles) { return !usable || usable(cycles); };
-  const bool cyclic = options_.most_cycles > 0 && may(1);
+std::vector<Run> SequenceCutter::cut(const ClipCurves& curves, const Skeleton& skeleton) const {
   std::vector<Run> runs;
   int first = 0;
   const auto add_run = [&](int last) {
     std::vector<CyclicStretch> stretches;
-    if (cyclic) stretches = find_cycles(curves, skeleton, first, last, options_.cycles);
-    runs.push_back(cut_run(movement_, stretches, first, last, curves.rate_hz, options_, may));
+    if (options_.most_cycles > 0) stretches = find_cycles(curves, skeleton, first, last, options_.cycles);
+    runs.push_back(cut_run(movement_, stretches, first, last, curves.rate_hz, options_));
     first = last + 1;
   };
   for (const int f : movement_.breaks) add_run(f);

@@ -16,7 +16,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "kinespace/fpca/cycles.h"
@@ -46,6 +45,14 @@ struct Run {
   std::vector<int> cuts;
   std::vector<std::uint8_t> cycles{};  // that each sequence holds, 0 where it was cut at rests; empty: all 0
 
+  // The other way to cut a stretch of cycles, sequences [sequence, sequence + count): at rests, between the same ends.
+  struct Alternative {
+    int sequence = 0;
+    int count = 0;
+    std::vector<int> cuts;
+  };
+  std::vector<Alternative> at_rests{};  // ascending, one for each stretch of cycles
+
   [[nodiscard]] int sequence_count() const { return cuts.size() == 1 ? 1 : static_cast<int>(cuts.size()) - 1; }
   [[nodiscard]] int first_frame(int sequence) const { return cuts[static_cast<std::size_t>(sequence)]; }
   [[nodiscard]] int last_frame(int sequence) const {
@@ -71,9 +78,7 @@ class SequenceCutter {
   };
 
   SequenceCutter(const Clip& clip, const SequenceOptions& options);
-  // `usable`: whether sequences of so many cycles may be made; all up to most_cycles when empty.
-  [[nodiscard]] std::vector<Run> cut(const ClipCurves& curves, const Skeleton& skeleton,
-                                     const std::function<bool(int cycles)>& usable = {}) const;
+  [[nodiscard]] std::vector<Run> cut(const ClipCurves& curves, const Skeleton& skeleton) const;
 
  private:
   SequenceOptions options_;

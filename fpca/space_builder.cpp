@@ -50,9 +50,26 @@ struct Survey {
   OrientationMoments orientations{0};
   Skeleton skeleton;
   std::string name;
+  BySet<double> seconds;  // of its sequences together ...
+  BySet<int> sequences;   // ... and how many they are
+  int stretches = 0;      // of cycles, that might be cut at rests
   BySet<int> longest;  // frames of the longest sequence less one; 0 where there is none
   // Clips with motion that was cut at rests, by a hash of their names: the order in which they are tried.
   std::vector<std::pair<std::string, int>> at_rests;
+
+  // Makes room for so many sets.
+  void reach(std::size_t sets) {
+    if (sets <= longest.size()) return;
+    longest.resize(sets, 0);
+    sequences.resize(sets, 0);
+    seconds.resize(sets, 0);
+  }
+  // How many times as long a set's sequences are as a sequence that was cut at rests usually is.
+  [[nodiscard]] double pace(std::size_t set) const {
+    constexpr double usual_s = 0.85;
+    if (set == 0 || sequences[set] == 0) return 1;
+    return std::clamp(seconds[set] / sequences[set] / usual_s, 1.0, 100.0);
+  }
 };
 
 constexpr int shortest_aligned = 4;  // frames; in fewer there is nothing to align
@@ -284,13 +301,16 @@ Survey survey(const PreparedSource& clips, const Progress& progress) {
       [](int i, PreparedClip& clip) {
         Survey one{.orientations = OrientationMoments(curve_layout(clip.skeleton).joint_count()),
                    .skeleton = clip.skeleton,
-                   .name = clip.curves.name,
-                   .longest = {0}};
+                   .name = clip.curves.name};
         one.orientations.add(clip.curves.values);
+        one.reach(1);
         for (const Run& run : clip.runs) {
+          one.stretches += static_cast<int>(run.at_rests.size());
           for (int k = 0; k < run.sequence_count(); ++k) {
             const auto set = static_cast<std::size_t>(run.cycles_of(k));
-            if (set >= one.longest.size()) one.longest.resize(set + 1, 0);
+            one.reach(set + 1);
+            ++one.sequences[set];
+            one.seconds[set] += (run.last_frame(k) - run.first_frame(k)) / clip.curves.rate_hz;
             one.longest[set] = std::max(one.longest[set], run.last_frame(k) - run.first_frame(k));
           }
         }
@@ -312,9 +332,12 @@ Survey survey(const PreparedSource& clips, const Progress& progress) {
         }
         all.orientations.merge(one.orientations);
         all.at_rests.insert(all.at_rests.end(), one.at_rests.begin(), one.at_rests.end());
-        all.longest.resize(std::max(all.longest.size(), one.longest.size()), 0);
+        all.stretches += one.stretches;
+        all.reach(one.longest.size());
         for (std::size_t set = 0; set < one.longest.size(); ++set) {
           all.longest[set] = std::max(all.longest[set], one.longest[set]);
+          all.sequences[set] += one.sequences[set];
+          all.seconds[set] += one.seconds[set];
         }
       });
   return all;
@@ -360,26 +383,13 @@ RegisteredSpace empty_space(const Survey& found, const MotionSpaceOptions& optio
   for (std::size_t set = 0; set < found.longest.size(); ++set) {
     MotionSpaceOptions of_set = options;
     of_set.cycles = static_cast<int>(set);
+    of_set.pace = found.pace(set);
     // A set that nothing was cut for is made of what there is (fit_sets).
     const std::size_t made_of = set == 0 ? first_set(found) : set;
     const int points = options.points != 0
                            ? options.points
                            : automatic_points(found.longest[made_of], static_cast<int>(made_of));
     sets.emplace_back(found.skeleton, of_set, points).set_references(references);
-  }
-  return RegisteredSpace(std::move(sets));
-}
-
-// The sets of a space, and new ones for kinds of sequences that it has not met.
-RegisteredSpace with_new_sets(const RegisteredSpace& space, const Survey& found) {
-  std::vector<MotionSpace> sets = space.sets();
-  const RegisteredSpace fresh = empty_space(found, space.options(), space.references());
-  for (std::size_t set = 0; set < fresh.sets().size(); ++set) {
-    if (set >= sets.size()) {
-      sets.push_back(fresh.sets()[set]);
-    } else if (sets[set].functions() == 0) {
-      sets[set] = fresh.sets()[set];
-    }
   }
   return RegisteredSpace(std::move(sets));
 }
@@ -486,11 +496,53 @@ bool alignment_pays(const PreparedSource& clips, Survey& found, const Registered
 
 }  // namespace
 
-BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& options, const Compute& compute,
+namespace {
+
+// The clips, each with other runs.
+template <typename Runs>
+PreparedSource with_runs(const PreparedSource& clips, const Runs& runs_of) {
+  return {clips.count, [&clips, runs_of](int i) {
+            PreparedClip clip = clips.load(i);
+            clip.runs = runs_of(i, clip.runs);
+            return clip;
+          }};
+}
+
+std::vector<RestChoice> choose_all(const PreparedSource& clips, const RegisteredSpace& space,
+                                   const Progress& progress) {
+  std::vector<RestChoice> out(static_cast<std::size_t>(clips.count));
+  for_each_clip<RestChoice>(
+      clips, progress, "register",
+      [&](int, PreparedClip& clip) {
+        space.apply_references(clip.curves.values);
+        return choose_rests(space, clip.curves.values, clip.runs, clip.curves.rate_hz);
+      },
+      [&](int i, RestChoice& choice) { out[static_cast<std::size_t>(i)] = std::move(choice); });
+  return out;
+}
+
+// Cycles or rests for every stretch of cycles, by the functions that the clips cut both ways have.
+std::vector<RestChoice> choose_all(const PreparedSource& clips, const Survey& found, const SpaceBuildOptions& options,
+                                   const Compute& compute, const Progress& progress) {
+  if (found.stretches == 0) return std::vector<RestChoice>(static_cast<std::size_t>(clips.count));
+  const PreparedSource both =
+      with_runs(clips, [](int, const std::vector<Run>& runs) { return both_ways(runs); });
+  const RegisteredSpace empty = empty_space(survey(both, progress), options.space, found.orientations.references());
+  return choose_all(clips, fit_sets(empty, gather_moments(both, empty, {}, compute, progress, "register")), progress);
+}
+
+}  // namespace
+
+BuiltSpace build_space(const PreparedSource& all_clips, const SpaceBuildOptions& options, const Compute& compute,
                        const Progress& progress) {
   options.validate();
-  if (clips.count == 0) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "one clip or more"});
-  Survey found = survey(clips, progress);
+  if (all_clips.count == 0) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "one clip or more"});
+  Survey found = survey(all_clips, progress);
+  const std::vector<RestChoice> choices = choose_all(all_clips, found, options, compute, progress);
+  const PreparedSource clips = with_runs(all_clips, [&choices](int i, const std::vector<Run>& runs) {
+    return apply_choice(runs, choices[static_cast<std::size_t>(i)]);
+  });
+  if (found.stretches > 0) found = survey(clips, progress);
   RegisteredSpace space = empty_space(found, options.space, found.orientations.references());
   std::vector<std::vector<Warp>> warps;
   const bool warped = options.align && options.alignment.rounds > 0 &&
@@ -499,31 +551,33 @@ BuiltSpace build_space(const PreparedSource& clips, const SpaceBuildOptions& opt
   space = fit_sets(space, gather_moments(clips, space, warps, compute, progress, "analyse"));
   space.set_warped(warped);
   if (warps.empty()) warps.resize(static_cast<std::size_t>(clips.count));
-  return {std::move(space), std::move(warps)};
+  return {std::move(space), choices, std::move(warps)};
 }
 
-BuiltSpace extend_space(const RegisteredSpace& space, const PreparedSource& clips, const SpaceBuildOptions& options,
+BuiltSpace extend_space(const RegisteredSpace& space, const PreparedSource& all_clips, const SpaceBuildOptions& options,
                         const Compute& compute, const Progress& progress) {
   options.validate();
+  // Kinds of sequences that the space has not met are cut at rests.
+  const std::vector<RestChoice> choices = choose_all(all_clips, space, progress);
+  const PreparedSource clips = with_runs(all_clips, [&choices](int i, const std::vector<Run>& runs) {
+    return apply_choice(runs, choices[static_cast<std::size_t>(i)]);
+  });
   std::vector<std::vector<Warp>> warps(static_cast<std::size_t>(clips.count));
   // Functions of all curves together are what warps are searched against; spaces of other groupings take clips as they
   // are.
-  if (options.align && space.warped() && options.alignment.rounds > 0 && space.options().grouping == Grouping::all_together &&
-      space.plain().functions() > 0) {
+  if (options.align && space.warped() && options.alignment.rounds > 0 &&
+      space.options().grouping == Grouping::all_together && space.plain().functions() > 0) {
     const WarpSearch search(space.plain(), options.alignment);
     for_each_clip<std::vector<Warp>>(
         clips, progress, "align", [&](int, PreparedClip& clip) { return align_prepared(search, space, clip, {}); },
         [&](int i, std::vector<Warp>& w) { warps[static_cast<std::size_t>(i)] = std::move(w); });
   }
-  const RegisteredSpace extended = with_new_sets(space, survey(clips, progress));
-  SetMoments moments = gather_moments(clips, extended, warps, compute, progress, "analyse");
-  for (std::size_t set = 0; set < space.sets().size(); ++set) {
-    for (std::size_t g = 0; g < moments[set].size(); ++g) {
-      const std::vector<CurveMoments>& before = space.sets()[set].moments();
-      if (g < before.size()) moments[set][g].merge(before[g]);
-    }
+  SetMoments moments = gather_moments(clips, space, warps, compute, progress, "analyse");
+  for (std::size_t set = 0; set < moments.size(); ++set) {
+    const std::vector<CurveMoments>& before = space.sets()[set].moments();
+    for (std::size_t g = 0; g < before.size(); ++g) moments[set][g].merge(before[g]);
   }
-  BuiltSpace built{fit_sets(extended, std::move(moments)), std::move(warps)};
+  BuiltSpace built{fit_sets(space, std::move(moments)), choices, std::move(warps)};
   built.space.set_warped(space.warped());
   return built;
 }

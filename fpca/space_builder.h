@@ -11,7 +11,7 @@
 #include "kinespace/base/progress.h"
 #include "kinespace/fpca/alignment.h"
 #include "kinespace/fpca/encoding.h"
-#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/registration.h"
 #include "kinespace/fpca/sequences.h"
 
 namespace kinespace {
@@ -52,7 +52,13 @@ struct SpaceBuildOptions {
 
 struct BuiltSpace {
   RegisteredSpace space;
-  std::vector<std::vector<Warp>> warps;  // for each clip, one a sequence
+  std::vector<RestChoice> at_rests;      // for each clip, which stretches of cycles are cut at rests after all
+  std::vector<std::vector<Warp>> warps;  // for each clip, one a sequence of its chosen runs
+
+  // The runs of clip i as they were chosen, from those that it was made ready with.
+  [[nodiscard]] std::vector<Run> runs_of(int i, const std::vector<Run>& runs) const {
+    return apply_choice(runs, at_rests[static_cast<std::size_t>(i)]);
+  }
 };
 
 // All clips must have the tree of the first; throws Error{bad_input} naming the two that differ, and Error{usage} for

@@ -151,9 +151,10 @@ MeasuredError distance(const JointPositions& a, const JointPositions& b) {
   return out.error();
 }
 
-MeasuredError measure_error(const PreparedClip& clip, const RegisteredSpace& space, const EncodedClip& encoded) {
+MeasuredError measure_error(const PreparedClip& clip, const RegisteredSpace& space, const EncodedClip& encoded,
+                            int level) {
   JointDistance out;
-  decode_in_parts(space, encoded, -1, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
+  decode_in_parts(space, encoded, level, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
     const auto original = clip.curves.values.middleRows(first, rows.rows());
     out.add(joint_positions(clip_of_frames(clip.curves, original, first, clip.skeleton)),
             joint_positions(clip_of_frames(clip.curves, rows, first, clip.skeleton)));
@@ -170,6 +171,14 @@ void count_cycles(const EncodedClip& clip, LibraryReport& report) {
       report.cyclic_seconds += (s.last - s.first) / clip.rate_hz;
     }
   }
+}
+
+// The levels of detail whose errors are measured: all that are ever played by themselves, and fewer and fewer beyond.
+std::vector<int> measured_levels(int all) {
+  std::vector<int> out;
+  for (int level = 1; level < all; level = level < 6 ? level + 1 : level + level / 4) out.push_back(level);
+  out.push_back(std::max(1, all));
+  return out;
 }
 
 // What a space does with the clips of one joint tree.
@@ -209,10 +218,13 @@ class SpaceWriter {
   [[nodiscard]] Ready make(PreparedClip prepared, int index) const {
     Ready out;
     built_.space.apply_references(prepared.curves.values);
-    out.clip =
-        encode(built_.space, prepared.curves, prepared.runs, built_.warps[static_cast<std::size_t>(index)], compute_);
+    out.clip = encode(built_.space, prepared.curves, built_.runs_of(index, prepared.runs),
+                      built_.warps[static_cast<std::size_t>(index)], compute_);
     round_to_stored(out.clip);
-    out.clip.error = measure_error(prepared, built_.space, out.clip);
+    for (const int level : measured_levels(built_.space.levels())) {
+      out.clip.levels.push_back({level, measure_error(prepared, built_.space, out.clip, level)});
+    }
+    out.clip.error = out.clip.levels.back().error;
     out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
     return out;
@@ -263,10 +275,12 @@ void transfer_clips(Library& library, std::int64_t space_id, const RegisteredSpa
       for (EncodedSequence& s : run.sequences) s.scores = to.of(s.cycles).transfer(s.scores, from.of(s.cycles));
     }
     round_to_stored(clip);
-    // Its own curves are not there any more; with what the transfer moves added, its error is never less than it is.
+    // Its own curves are not there any more: errors of levels are not known any more, and with what the transfer moves
+    // added, its error is never less than it is.
     const MeasuredError moved = distance(before, joint_positions(clip_from_curves(decode(to, clip), skeleton)));
     clip.error.mean_joint_error_cm += moved.mean_joint_error_cm;
     clip.error.max_joint_error_cm += moved.max_joint_error_cm;
+    clip.levels.clear();
     const std::vector<float> old_vector = library.retrieval_vector(row.id);
     const Eigen::Map<const ScoreMatrix> old_scores(old_vector.data(), clips_from.space().functions(),
                                                    clips_from.space().curves());
@@ -344,6 +358,7 @@ void summarise(Library& library, LibraryReport& report) {
     report.warped = report.warped || space.warped();
   }
   library.set_metadata("functions", std::to_string(report.functions));
+  library.set_metadata("movement", fmt::format("{:.9f}", report.movement));
   library.set_metadata("variance", fmt::format("{:.9f}", report.variance));
   report.clips = static_cast<int>(library.totals().clips);
 }

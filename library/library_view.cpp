@@ -157,6 +157,12 @@ LibraryView::LevelOfDetail LibraryView::level_for_error(const ClipRow& row, doub
   const Skeleton& bones = skeleton(row.skeleton_id);
   const EncodedClip whole = encoded(row);
   const std::optional<Clip> source = unchanged_source(row);
+  if (!source && !whole.levels.empty()) {
+    for (const LevelError& l : whole.levels) {
+      if (l.error.max_joint_error_cm <= max_error_cm) return {l.level, l.error.max_joint_error_cm, false};
+    }
+    refuse_level(library_, row, fmt::format("{:.3g} cm", whole.levels.back().error.max_joint_error_cm), max_error_cm);
+  }
   const JointPositions target = joint_positions(source ? *source : clip_from_curves(decode(s, whole), bones));
   // The library keeps errors as 32-bit floats.
   const double unseen_cm = source ? 0 : whole.error.max_joint_error_cm * (1 + 1e-6);

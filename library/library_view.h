@@ -44,8 +44,9 @@ class LibraryView {
   [[nodiscard]] Clip clip(const ClipRow& row, int functions = -1);
 
   // The fewest functions whose decoded clip is, at every joint and frame, within the given distance in cm of the clip
-  // as it was read. Where the file it was read from is still there unchanged, that is measured; else it is the error
-  // that was measured when the library was built plus the distance from what all functions give, which is never less.
+  // as it was read. Where the file it was read from is still there unchanged, that is measured; else the fewest of the
+  // levels whose error was measured when the library was built; where these are not known (clips of before, and those
+  // that others were added to), the error of all functions plus the distance from what they give, which is never less.
   // Throws Error{usage} when even all functions do not come that near, or nothing is known of how near they come.
   struct LevelOfDetail {
     int functions = 0;

@@ -101,6 +101,12 @@ std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> by
   return {std::move(group), CurveMoments(count, mean, scatter)};
 }
 
+// A float that is no less: what is printed of an error is never below it.
+float rounded_up(double value) {
+  const auto near = static_cast<float>(value);
+  return static_cast<double>(near) >= value ? near : std::nextafter(near, std::numeric_limits<float>::infinity());
+}
+
 std::string group_name(std::size_t i) {
   return fmt::format("group {}", i);
 }
@@ -311,6 +317,7 @@ Bytes pack_space(const MotionSpace& space) {
   out.set_option("smooth", static_cast<std::int64_t>(space.options_.smooth ? 1 : 0));
   if (space.options_.pinned) out.set_option("pinned", std::int64_t{1});
   if (space.options_.cycles > 0) out.set_option("cycles", static_cast<std::int64_t>(space.options_.cycles));
+  if (space.options_.pace != 1) out.set_option("pace", space.options_.pace);
   out.add_section("skeleton", pack_skeleton(space.skeleton_));
   ByteWriter references;
   put_matrix(references, space.references_);
@@ -335,6 +342,7 @@ MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& so
   options.smooth = stream.integer_option("smooth", 0, 1) == 1;
   if (stream.find_option("pinned") != nullptr) options.pinned = stream.integer_option("pinned", 0, 1) == 1;
   if (stream.find_option("cycles") != nullptr) options.cycles = static_cast<int>(stream.integer_option("cycles", 0, 8));
+  if (stream.find_option("pace") != nullptr) options.pace = stream.number_option("pace", 1, 100);
   MotionSpace space(unpack_skeleton(stream.section("skeleton"), source), options, points);
   ByteReader references(stream.section("references"), source);
   space.set_references(get_matrix(references, 4, space.layout().joint_count()));
@@ -398,6 +406,40 @@ RegisteredSpace unpack_registered_space(std::span<const std::byte> bytes, const 
   return out;
 }
 
+namespace {
+
+Bytes pack_levels(const std::vector<LevelError>& levels) {
+  ByteWriter out;
+  put_varint(out, levels.size());
+  for (const LevelError& l : levels) {
+    put_varint(out, static_cast<std::uint64_t>(l.level));
+    out.put(rounded_up(l.error.mean_joint_error_cm));
+    out.put(rounded_up(l.error.max_joint_error_cm));
+  }
+  return std::move(out).take();
+}
+
+std::vector<LevelError> unpack_levels(ByteReader in, int levels) {
+  std::vector<LevelError> out(get_count(in, 9, "levels of detail"));
+  int before = 0;
+  for (LevelError& l : out) {
+    const std::uint64_t level = get_varint(in);
+    if (level <= static_cast<std::uint64_t>(before) || level > static_cast<std::uint64_t>(levels)) {
+      in.fail(fmt::format("level of detail {}", level), fmt::format("ascending levels up to {}", levels));
+    }
+    before = l.level = static_cast<int>(level);
+    l.error.mean_joint_error_cm = static_cast<double>(in.get<float>());
+    l.error.max_joint_error_cm = static_cast<double>(in.get<float>());
+    if (!(l.error.mean_joint_error_cm >= 0) || !std::isfinite(l.error.max_joint_error_cm)) {
+      in.fail("an error that is no distance", "cm");
+    }
+  }
+  in.expect_end();
+  return out;
+}
+
+}  // namespace
+
 PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   PackedClip out;
   BitstreamWriter vectors("clip-vectors");
@@ -411,7 +453,10 @@ PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   if (kinds) warps.set_option("kinds", std::int64_t{1});
   warps.add_section("sequences", pack_sequences(clip, kinds));
   out.warps = warps.finish();
-  out.side = one_section("clip-side", "side", pack_side(clip));
+  BitstreamWriter side("clip-side");
+  side.add_section("side", pack_side(clip));
+  if (!clip.levels.empty()) side.add_section("levels", pack_levels(clip.levels));
+  out.side = side.finish();
   return out;
 }
 
@@ -436,6 +481,7 @@ EncodedClip unpack_clip(const PackedClip& packed, const RegisteredSpace& space, 
   const Bitstream side = Bitstream::parse(packed.side, source);
   side.require_kind("clip-side");
   unpack_side(ByteReader(side.section("side"), source), clip, skeleton, source);
+  if (side.has_section("levels")) clip.levels = unpack_levels(ByteReader(side.section("levels"), source), space.levels());
 
   const Bitstream vectors = Bitstream::parse_prefix(packed.vectors, source);
   vectors.require_kind("clip-vectors");
@@ -498,6 +544,13 @@ void put_head(ByteWriter& out, const PreparedClip& clip) {
     put_varint(out, run.cuts.size());
     for (const int frame : run.cuts) put_varint(out, static_cast<std::uint64_t>(frame));
     for (int i = 0; i < run.sequence_count(); ++i) put_varint(out, static_cast<std::uint64_t>(run.cycles_of(i)));
+    put_varint(out, run.at_rests.size());
+    for (const Run::Alternative& other : run.at_rests) {
+      put_varint(out, static_cast<std::uint64_t>(other.sequence));
+      put_varint(out, static_cast<std::uint64_t>(other.count));
+      put_varint(out, other.cuts.size());
+      for (const int frame : other.cuts) put_varint(out, static_cast<std::uint64_t>(frame));
+    }
   }
   const Bytes skeleton = pack_skeleton(clip.skeleton);
   put_varint(out, skeleton.size());
@@ -505,6 +558,34 @@ void put_head(ByteWriter& out, const PreparedClip& clip) {
   const Bytes tracks = pack_side_tracks(clip.curves.side_tracks);
   put_varint(out, tracks.size());
   out.put_bytes(tracks);
+}
+
+// Other cuts of stretches of a run: each from one of its cuts to another, stretches ascending.
+void get_alternatives(ByteReader& in, Run& run) {
+  const std::size_t count = get_count(in, 3, "stretches");
+  int next = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint64_t sequence = get_varint(in);
+    const std::uint64_t sequences = get_varint(in);
+    const auto all = static_cast<std::uint64_t>(run.sequence_count());
+    if (sequence < static_cast<std::uint64_t>(next) || sequences < 1 || sequence >= all || sequences > all - sequence) {
+      in.fail("a stretch out of place", "sequences of the run");
+    }
+    Run::Alternative other{static_cast<int>(sequence), static_cast<int>(sequences), {}};
+    next = other.sequence + other.count;
+    other.cuts.resize(get_count(in, 1, "cuts"));
+    for (int& frame : other.cuts) {
+      const std::uint64_t at = get_varint(in);
+      if (at > static_cast<std::uint64_t>(run.cuts.back())) in.fail("a cut beyond the end", "frames of the run");
+      frame = static_cast<int>(at);
+    }
+    const bool same_ends = other.cuts.size() >= 2 && other.cuts.front() == run.first_frame(other.sequence) &&
+                           other.cuts.back() == run.last_frame(next - 1);
+    if (!same_ends || !std::ranges::is_sorted(other.cuts, std::less_equal<>{})) {
+      in.fail("cuts out of order", "ascending frames between the ends of the stretch");
+    }
+    run.at_rests.push_back(std::move(other));
+  }
 }
 
 // All but the values; room for these is made where they are known to be there.
@@ -532,6 +613,7 @@ PreparedClip get_head(ByteReader& in, const std::string& source, int& frame_coun
       if (cycles > 8) in.fail(fmt::format("a sequence of {} cycles", cycles), "0 to 8");
       run.cycles.push_back(static_cast<std::uint8_t>(cycles));
     }
+    get_alternatives(in, run);
   }
   out.skeleton = unpack_skeleton(get_part(in, "bytes"), source);
   out.curves.side_tracks = unpack_side_tracks(get_part(in, "bytes"), static_cast<int>(frames), out.skeleton, source);
