@@ -24,7 +24,7 @@ using ComponentCurves = std::array<CurveMatrix, components>;
 
 std::vector<PreparedClip> load_clips(const std::filesystem::path& folder) {
   std::vector<PreparedClip> out;
-  for (const auto& file : find_motion_files({folder})) out.push_back(prepare(read_clip(file)));
+  for (const auto& file : find_motion_files({folder})) out.push_back(prepare(read_clip(file), {.most_cycles = 0}));
   return out;
 }
 

@@ -99,11 +99,12 @@ double cycles_of(const Library& library) {
 // Of all clips whose errors are known: frames count alike.
 class LevelTable {
  public:
-  void add(const EncodedClip& clip) {
-    for (const LevelError& l : clip.levels) {
+  void add(const ClipRow& clip, const std::vector<LevelError>& errors) {
+    for (const LevelError& l : errors) {
       Sum& sum = levels_[l.level];
-      sum.frames += clip.frames;
-      sum.error += l.error.mean_joint_error_cm * clip.frames;
+      const auto frames = static_cast<double>(clip.frames);
+      sum.frames += frames;
+      sum.error += l.error.mean_joint_error_cm * frames;
       if (l.error.max_joint_error_cm > sum.largest) {
         sum.largest = l.error.max_joint_error_cm;
         sum.clip = clip.name;
@@ -150,7 +151,7 @@ Json describe_library(const InfoOptions& options, Session& /*session*/) {
   }
   LevelTable levels;
   for (const ClipRow& row : library.clips()) {
-    levels.add(view.encoded(row, 0));
+    levels.add(row, view.level_errors(row));
     rate = std::max(rate, row.rate_hz);
     const auto space = space_at.find(row.space_id);
     clips.push_back({{"name", row.name},
@@ -231,6 +232,16 @@ std::string labels_of_row(const Json& clip) {
   return out;
 }
 
+// How near each level of detail comes to the clips as they were read.
+void print_levels(const Json& levels) {
+  if (levels.empty()) return;
+  print("\n{:>9}  {:>7}  {:>10}  of\n", "functions", "mean cm", "largest cm");
+  for (const Json& level : levels) {
+    print("{:>9}  {:>7.3f}  {:>10.2f}  {}\n", level["functions"].get<int>(), level["mean_joint_error_cm"].get<double>(),
+          level["max_joint_error_cm"].get<double>(), printable(level["worst_clip"].get<std::string>()));
+  }
+}
+
 // The clips of a library or a stream for people, after its figures; and of a library its skeletons.
 void print_lists(const Json& description, std::size_t limit) {
   if (description.contains("spaces")) {
@@ -241,6 +252,7 @@ void print_lists(const Json& description, std::size_t limit) {
             space["clips"].get<std::int64_t>());
     }
   }
+  if (description.contains("levels") && description["levels"].is_array()) print_levels(description["levels"]);
   if (!description.contains("clip_list")) return;
   const Json& clips = description["clip_list"];
   const std::size_t shown = limit == 0 ? clips.size() : std::min(limit, clips.size());

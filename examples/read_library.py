@@ -3,8 +3,8 @@
 
     read_library.py LIB.kspace [CLIP]
 
-prints the clips, the functions of each motion space with their shares of the variance, and of CLIP (the first when none is named) each sequence:
-its frames, its time warp and the length of its motion vector in each function. Checksums are not checked: Python has no XXH3.
+prints the clips, the functions of each motion space, for each kind of sequence, with their shares of the variance, and of CLIP (the first when none is named) each sequence:
+its frames, its whole cycles, its time warp and the length of its motion vector in each row (ends first, then functions). Checksums are not checked: Python has no XXH3.
 """
 import itertools
 import math
@@ -51,28 +51,50 @@ def stream(blob):
     return options, {name: file.take(size) for name, _, size, _ in table}
 
 
+class FunctionSet:
+    """Functions for sequences of one kind: cut at rests, or of so many whole cycles."""
+
+    def __init__(self, blob):
+        options, sections = stream(blob)
+        points, self.pinned = int(options["points"]), int(options.get("pinned", 0))
+        self.pace, self.groups = float(options.get("pace", 1)), []
+        while section := sections.get(f"group {len(self.groups)}"):
+            group = Bytes(section)
+            count, _ = group.varint(), group.varint()
+            variance, *left = group.numbers("d", 1 + self.pinned)
+            mean, eigenvalues = group.numbers("d", points), group.numbers("d", count)
+            functions = [group.numbers("d", points) for _ in range(count)]
+            self.groups.append((variance, left[0] if left else variance - sum(eigenvalues), mean, eigenvalues, functions))
+        self.curves = 3 + 4 * (len(sections["references"]) // 32)
+        self.rows = 2 * self.pinned + max(len(group[3]) for group in self.groups)
+
+    def rows_at(self, level):
+        """How many rows of scores a level of detail has; in a pinned space the first two are the ends of the sequence."""
+        numbers = math.ceil(level * self.pace - 1e-9)
+        return min(self.rows, max(2, numbers + 1) if self.pinned else numbers)
+
+
 def space(blob):
-    """The number of curves, and of each group of them: variance, mean, eigenvalues, eigenfunctions."""
-    options, sections = stream(blob)
-    points, groups = int(options["points"]), []
-    while section := sections.get(f"group {len(groups)}"):
-        group = Bytes(section)
-        count, _ = group.varint(), group.varint()
-        (variance,), mean, eigenvalues = group.numbers("d", 1), group.numbers("d", points), group.numbers("d", count)
-        groups.append((variance, mean, eigenvalues, [group.numbers("d", points) for _ in range(count)]))
-    return 3 + 4 * (len(sections["references"]) // 32), groups
+    """The function sets of a motion space, by the cycles that a sequence holds; 0: it was cut at rests."""
+    sections = stream(blob)[1]
+    if "references" in sections:  # libraries of before sequences had kinds
+        return {0: FunctionSet(blob)}
+    return {int(name.removeprefix("cycles ")): FunctionSet(section) for name, section in sections.items()}
 
 
 def sequences(blob):
-    """First frame, last frame and the five coefficients of the warp of each sequence of a clip."""
-    part, out = Bytes(stream(blob)[1]["sequences"]), []
-    for _ in range(part.varint()):  # runs
-        count, first = part.varint(), part.varint()
+    """Of each run of a clip the sequences: first frame, last frame, whole cycles, and the five coefficients of the warp."""
+    options, sections = stream(blob)
+    part, runs = Bytes(sections["sequences"]), []
+    for _ in range(part.varint()):
+        count, first, run = part.varint(), part.varint(), []
         for _ in range(count):
             last = first + part.varint()
-            out.append((first, last, [a / 64 for a in part.numbers("b", 5)]))
+            cycles = part.take(1)[0] if "kinds" in options else 0
+            run.append((first, last, cycles, [a / 64 for a in part.numbers("b", 5)]))
             first = last
-    return out
+        runs.append(run)
+    return runs
 
 
 def unpacked(block, count):
@@ -86,14 +108,29 @@ def unpacked(block, count):
     return struct.unpack(f"<{count}f", raw)
 
 
-def scores(blob, count, curves):
-    """[function][sequence][curve]: the motion vectors of a clip of so many sequences."""
-    part, out = Bytes(stream(blob)[1]["scores"]), []
+def scores(blob, runs, sets):
+    """[sequence][row][curve]: the motion vectors of a clip, run after run."""
+    part, level = Bytes(stream(blob)[1]["scores"]), 0
+    out = [[[None] * sets[cycles].rows for _, _, cycles, _ in run] for run in runs]
+    curves = sets[0].curves
     while part.at < len(part.data):
         size, _ = part.varint(), part.take(4)  # checksum
-        steps = unpacked(part.take(size), count * curves)
-        out.append([[1e-4 * step for step in steps[i * curves : (i + 1) * curves]] for i in range(count)])
-    return out
+        block, level = part.take(size), level + 1
+        places = []  # run, sequence and row of each row of the block
+        for r, run in enumerate(runs):
+            for i, (_, _, cycles, _) in enumerate(run):
+                kept = sets[cycles].rows_at(level - 1) if level > 1 else 0
+                shared = 1 if i > 0 and kept == 0 and sets[cycles].pinned else 0  # the end of the sequence before
+                places += [(row - kept - shared, r, i, row) for row in range(kept + shared, sets[cycles].rows_at(level))]
+        steps = unpacked(block, len(places) * curves)
+        for at, (_, r, i, row) in enumerate(sorted(places)):
+            step = 1e-4 / math.sqrt(sets[runs[r][i][2]].pace)
+            out[r][i][row] = [step * value for value in steps[at * curves : (at + 1) * curves]]
+    for run, vectors in zip(runs, out):
+        for before, vector in zip(vectors, vectors[1:]):
+            if vector[0] is None:
+                vector[0] = before[1]
+    return [vector for run in out for vector in run]
 
 
 def main(path, wanted=None):
@@ -104,21 +141,24 @@ def main(path, wanted=None):
         print(f"  {name} {frames} frames {rate:g} Hz")
     spaces = {}
     for number, name, blob in library.execute("SELECT id, name, blob FROM spaces WHERE name LIKE 'sequences %' ORDER BY id"):
-        _, groups = spaces[number] = space(blob)
+        spaces[number] = space(blob)
         print("space", name.removeprefix("sequences "))
-        print("  functions", max(len(group[2]) for group in groups))
-        print(f"  variance {sum(sum(group[2]) for group in groups) / sum(group[0] for group in groups):.9f}")
-        for group in groups:
-            print("  shares", *[f"{value / group[0]:.6f}" for value in group[2]])
+        for cycles, of in spaces[number].items():
+            print("  cycles", cycles)
+            print("    functions", max(len(group[3]) for group in of.groups))
+            print(f"    variance {1 - sum(group[1] for group in of.groups) / sum(group[0] for group in of.groups):.9f}")
+            for group in of.groups:
+                print("    shares", *[f"{value / group[0]:.6f}" for value in group[3]])
 
     name, number, _, _, home = next((clip for clip in clips if wanted in (None, clip[0])), None) or sys.exit(f"no clip {wanted}")
     blob = lambda table: library.execute(f"SELECT blob FROM {table} WHERE clip_id = ?", (number,)).fetchone()[0]
-    parts, curves = sequences(blob("clip_warps")), spaces[home][0]
-    vectors = scores(blob("clip_vectors"), len(parts), curves) if shutil.which("zstd") else []
-    print("clip", name, "curves", curves)
-    for i, (first, last, warp) in enumerate(parts):
-        print("  frames", first, "to", last, "warp", *warp)
-        print("    lengths", *[f"{math.hypot(*function[i]):.4f}" for function in vectors])
+    runs = sequences(blob("clip_warps"))
+    vectors = scores(blob("clip_vectors"), runs, spaces[home]) if shutil.which("zstd") else []
+    print("clip", name, "curves", spaces[home][0].curves)
+    for i, (first, last, cycles, warp) in enumerate(itertools.chain(*runs)):
+        print("  frames", first, "to", last, "cycles", cycles, "warp", *warp)
+        if vectors:
+            print("    lengths", *[f"{math.hypot(*row):.4f}" for row in vectors[i] if row])
     if not vectors:
         print("  no motion vectors: they are packed with zstd, and there is no zstd command here")
 

@@ -29,6 +29,7 @@ struct AlignmentOptions {
   int functions = 5;         // n, 1 .. 64; aligned for this level of detail and for twice as many
   int rounds = 2;            // 0 .. 10; each aligns to the functions of the round before
   double least_gain = 0.15;  // [0, 1); share of sqrt(E_n E_2n) that a warp must take to be kept
+  bool on_trial = true;      // for all of a library only where warps win on clips that they were not found with
   int templates = 48;        // 0 .. 1000; groups, each with a template; 0: refine from the identity only
 
   // Throws Error{usage} naming field, value and legal range.

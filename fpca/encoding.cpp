@@ -8,6 +8,7 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/cut_join.h"
+#include "kinespace/fpca/left_out.h"
 #include "kinespace/fpca/registration.h"
 
 namespace kinespace {
@@ -140,21 +141,28 @@ EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const
   return out;
 }
 
-void decode_in_parts(const RegisteredSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
-                     const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit) {
+ClipDecoder::ClipDecoder(const RegisteredSpace& space)
+    : space_(space), left_out_(space.options().pinned ? std::make_unique<const LeftOut>(space) : nullptr) {}
+ClipDecoder::~ClipDecoder() = default;
+ClipDecoder::ClipDecoder(ClipDecoder&&) noexcept = default;
+
+void ClipDecoder::decode_in_parts(
+    const EncodedClip& clip, int n, const JoinOptions& options,
+    const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit) const {
   for (const EncodedRun& run : clip.runs) {
     // Two sequences at a time: positions of the root in metres from the clip's start, and quaternions.
     Eigen::Vector3d start = run.start.cast<double>();
     SampleMatrix next;
     std::optional<CutCorrection> before;
     for (std::size_t i = 0; i < run.sequences.size(); ++i) {
-      SampleMatrix frames = i == 0 ? decode_frames(space, run.sequences[i], start, clip.rate_hz, n) : std::move(next);
+      SampleMatrix frames = i == 0 ? decode_frames(space_, run.sequences[i], start, clip.rate_hz, n) : std::move(next);
       start += run.sequences[i].travel.cast<double>();
       std::optional<CutCorrection> after;
       const bool last = i + 1 == run.sequences.size();
       if (!last) {
-        next = decode_frames(space, run.sequences[i + 1], start, clip.rate_hz, n);
+        next = decode_frames(space_, run.sequences[i + 1], start, clip.rate_hz, n);
         after = cut_correction(frames, next, options.free_change);
+        if (left_out_) after->slope = left_out_->slope(run.sequences[i], run.sequences[i + 1], n);
       }
       join(frames, before ? &*before : nullptr, after ? &*after : nullptr, options);
       // The frame that two share is the later one's.
@@ -164,16 +172,25 @@ void decode_in_parts(const RegisteredSpace& space, const EncodedClip& clip, int 
   }
 }
 
-ClipCurves decode(const RegisteredSpace& space, const EncodedClip& clip, int n, const JoinOptions& options) {
+ClipCurves ClipDecoder::decode(const EncodedClip& clip, int n, const JoinOptions& options) const {
   ClipCurves out{.name = clip.name,
                  .rate_hz = clip.rate_hz,
                  .placement = clip.placement,
-                 .values = SampleMatrix(clip.frames, space.curves()),
+                 .values = SampleMatrix(clip.frames, space_.curves()),
                  .side_tracks = clip.side_tracks};
-  decode_in_parts(space, clip, n, options, [&out](int first, const Eigen::Ref<const SampleMatrix>& rows) {
+  decode_in_parts(clip, n, options, [&out](int first, const Eigen::Ref<const SampleMatrix>& rows) {
     out.values.middleRows(first, rows.rows()) = rows;
   });
   return out;
+}
+
+void decode_in_parts(const RegisteredSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
+                     const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit) {
+  ClipDecoder(space).decode_in_parts(clip, n, options, visit);
+}
+
+ClipCurves decode(const RegisteredSpace& space, const EncodedClip& clip, int n, const JoinOptions& options) {
+  return ClipDecoder(space).decode(clip, n, options);
 }
 
 EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip, const SequenceOptions& sequences) {

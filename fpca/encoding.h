@@ -7,6 +7,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -58,8 +59,8 @@ struct EncodedClip {
 
 struct JoinOptions {
   double blend = 0.13;       // of a sequence's length, (0, 0.5]
-  double free_change = 4;  // how many times the typical change of slope inside (rms) may stay at a cut; >= 0. Cycles are
-                           // cut amid motion, where slopes do change: less would take out what was there
+  double free_change = 0.3;  // how much of the typical change of slope inside (rms) may stay at a cut; >= 0. Of spaces
+                             // that are not pinned; the others know what change there was (fpca/left_out.h)
 };
 
 // The curves of a run as splines, ready to be sampled sequence by sequence.
@@ -99,6 +100,26 @@ class RunSampler {
 // of the frames from there on (ClipCurves::values), every frame once, ascending.
 void decode_in_parts(const RegisteredSpace& space, const EncodedClip& clip, int n, const JoinOptions& options,
                      const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit);
+
+// The same for many clips or levels of one space, which must outlive it: what needs the space alone is made once.
+class LeftOut;
+class ClipDecoder {
+ public:
+  explicit ClipDecoder(const RegisteredSpace& space);
+  ~ClipDecoder();
+  ClipDecoder(ClipDecoder&&) noexcept;
+  ClipDecoder& operator=(ClipDecoder&&) = delete;
+  ClipDecoder(const ClipDecoder&) = delete;
+  ClipDecoder& operator=(const ClipDecoder&) = delete;
+
+  [[nodiscard]] ClipCurves decode(const EncodedClip& clip, int n = -1, const JoinOptions& options = {}) const;
+  void decode_in_parts(const EncodedClip& clip, int n, const JoinOptions& options,
+                       const std::function<void(int first, const Eigen::Ref<const SampleMatrix>& rows)>& visit) const;
+
+ private:
+  const RegisteredSpace& space_;
+  std::unique_ptr<const LeftOut> left_out_;  // of a pinned space
+};
 
 // A clip outside the library, into the space: curves, sides, cuts, vectors. Throws Error{bad_input} for another
 // skeleton.

@@ -26,18 +26,6 @@ FpcaOptions fpca_options(const MotionSpaceOptions& options) {
   return out;
 }
 
-// On the device when it is one for blocks of this size, else in double here.
-void add_block(const CurveMatrix& block, const Compute& compute, CurveMoments& moments) {
-  const double flops = static_cast<double>(block.rows()) * static_cast<double>(block.cols() * block.cols());
-  if (compute.device_for(KernelFamily::covariance, flops) == nullptr) {
-    moments.add(block);
-    return;
-  }
-  const RowMatrix<float> curves = block.cast<float>();
-  const CurveCovariance c = covariance(curves, 0, BlockPrecision::single_precision, compute);
-  moments.merge(CurveMoments(c.count, c.mean, c.covariance * static_cast<double>(c.count)));
-}
-
 // s at the points of the grid.
 Eigen::VectorXd times_of(int points) {
   return Eigen::VectorXd::LinSpaced(points, 0, 1);
@@ -60,6 +48,38 @@ CurveMoments above_the_lines(const CurveMoments& moments) {
   above.col(0) -= Eigen::VectorXd::Ones(points) - s;
   above.col(points - 1) -= s;
   return {moments.count(), above * moments.mean(), above * moments.scatter() * above.transpose()};
+}
+
+// Moments on a device, in float. Of curves y = L e + r, with lines L = [1 - s, s] between their ends e, only the scatter
+// of r is left to it: lines carry nearly all of the variance, and its digits would be gone from r.
+CurveMoments moments_on_device(const CurveMatrix& block, bool pinned, const Compute& compute) {
+  const Eigen::Index points = block.cols();
+  CurveMatrix lines(2, points);
+  lines.row(1).setLinSpaced(points, 0, 1);
+  lines.row(0) = Eigen::RowVectorXd::Ones(points) - lines.row(1);
+  CurveMatrix ends = CurveMatrix::Zero(block.rows(), 2);
+  if (pinned) ends << block.col(0), block.col(points - 1);
+  CurveMatrix above = block - ends * lines;
+  const RowMatrix<float> curves = above.cast<float>();
+  const CurveCovariance c = covariance(curves, 0, BlockPrecision::single_precision, compute);
+  const Eigen::MatrixXd scatter = c.covariance * static_cast<double>(c.count);
+  if (!pinned) return {c.count, c.mean, scatter};
+  const Eigen::RowVectorXd mean_end = ends.colwise().mean();
+  ends.rowwise() -= mean_end;
+  above.rowwise() -= c.mean.transpose();
+  const Eigen::MatrixXd across = above.transpose() * ends * lines;
+  return {c.count, c.mean + (mean_end * lines).transpose(),
+          scatter + across + across.transpose() + lines.transpose() * (ends.transpose() * ends) * lines};
+}
+
+// On the device when it is one for blocks of this size, else in double here.
+void add_block(const CurveMatrix& block, bool pinned, const Compute& compute, CurveMoments& moments) {
+  const double flops = static_cast<double>(block.rows()) * static_cast<double>(block.cols() * block.cols());
+  if (compute.device_for(KernelFamily::covariance, flops) == nullptr) {
+    moments.add(block);
+  } else {
+    moments.merge(moments_on_device(block, pinned, compute));
+  }
 }
 
 // Mean over the curves of their mean square distance in time from their common mean.
@@ -168,7 +188,7 @@ void MotionSpace::accumulate(std::span<const SampleMatrix> samples, std::vector<
     for (const SampleMatrix& s : samples) {
       for (const int c : members) block.row(row++) = s.col(c).transpose();
     }
-    add_block(block, compute, moments[static_cast<std::size_t>(g)]);
+    add_block(block, options_.pinned, compute, moments[static_cast<std::size_t>(g)]);
   }
 }
 

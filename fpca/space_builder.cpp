@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include <Eigen/Eigenvalues>
@@ -53,7 +54,7 @@ struct Survey {
   BySet<double> seconds;  // of its sequences together ...
   BySet<int> sequences;   // ... and how many they are
   int stretches = 0;      // of cycles, that might be cut at rests
-  BySet<int> longest;  // frames of the longest sequence less one; 0 where there is none
+  BySet<int> longest;     // frames of the longest sequence less one; 0 where there is none
   // Clips with motion that was cut at rests, by a hash of their names: the order in which they are tried.
   std::vector<std::pair<std::string, int>> at_rests;
 
@@ -75,8 +76,8 @@ struct Survey {
 constexpr int shortest_aligned = 4;  // frames; in fewer there is nothing to align
 
 int automatic_points(int longest_sequence, int cycles) {
-  // Three cycles in as many points move faster than a second does in 85, which is beyond what a body does.
-  const int most = cycles > 0 ? 256 : 1024;
+  // The set's moments grow with the square of the points.
+  const int most = cycles > 0 ? 512 : 1024;
   return std::clamp(longest_sequence + 12, 48, most);
 }
 
@@ -477,6 +478,7 @@ double residual_of(const PreparedSource& clips, const RegisteredSpace& space, co
 // they are found for four fifths of a few clips, and kept only if functions under them leave less of the last fifth.
 bool alignment_pays(const PreparedSource& clips, Survey& found, const RegisteredSpace& space,
                     const SpaceBuildOptions& options, const Compute& compute, const Progress& progress) {
+  if (!options.alignment.on_trial) return true;
   constexpr std::size_t fewest = 10;
   constexpr std::size_t most = 80;
   constexpr double worth_it = 0.95;
@@ -498,6 +500,8 @@ bool alignment_pays(const PreparedSource& clips, Survey& found, const Registered
 
 namespace {
 
+constexpr double least_share = 0.02;  // of all sequences, that a set of cycles must hold to be kept
+
 // The clips, each with other runs.
 template <typename Runs>
 PreparedSource with_runs(const PreparedSource& clips, const Runs& runs_of) {
@@ -506,6 +510,13 @@ PreparedSource with_runs(const PreparedSource& clips, const Runs& runs_of) {
             clip.runs = runs_of(i, clip.runs);
             return clip;
           }};
+}
+
+// `choices` must outlive it.
+PreparedSource with_choices(const PreparedSource& clips, const std::vector<RestChoice>& choices) {
+  return with_runs(clips, [&choices](int i, const std::vector<Run>& runs) {
+    return apply_choice(runs, choices[static_cast<std::size_t>(i)]);
+  });
 }
 
 std::vector<RestChoice> choose_all(const PreparedSource& clips, const RegisteredSpace& space,
@@ -528,7 +539,20 @@ std::vector<RestChoice> choose_all(const PreparedSource& clips, const Survey& fo
   const PreparedSource both =
       with_runs(clips, [](int, const std::vector<Run>& runs) { return both_ways(runs); });
   const RegisteredSpace empty = empty_space(survey(both, progress), options.space, found.orientations.references());
-  return choose_all(clips, fit_sets(empty, gather_moments(both, empty, {}, compute, progress, "register")), progress);
+  RegisteredSpace space = fit_sets(empty, gather_moments(both, empty, {}, compute, progress, "register"));
+  std::vector<RestChoice> choices = choose_all(clips, space, progress);
+  // A set costs what its functions and moments take, whatever it is used for.
+  const Survey chosen = survey(with_choices(clips, choices), progress);
+  const int all = std::accumulate(chosen.sequences.begin(), chosen.sequences.end(), 0);
+  std::vector<MotionSpace> sets = space.sets();
+  bool dropped = false;
+  for (std::size_t set = 1; set < sets.size(); ++set) {
+    const int held = set < chosen.sequences.size() ? chosen.sequences[set] : 0;
+    if (sets[set].functions() == 0 || held >= least_share * all) continue;
+    sets[set] = empty.sets()[set];
+    dropped = true;
+  }
+  return dropped ? choose_all(clips, RegisteredSpace(std::move(sets)), progress) : choices;
 }
 
 }  // namespace
@@ -539,9 +563,7 @@ BuiltSpace build_space(const PreparedSource& all_clips, const SpaceBuildOptions&
   if (all_clips.count == 0) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "one clip or more"});
   Survey found = survey(all_clips, progress);
   const std::vector<RestChoice> choices = choose_all(all_clips, found, options, compute, progress);
-  const PreparedSource clips = with_runs(all_clips, [&choices](int i, const std::vector<Run>& runs) {
-    return apply_choice(runs, choices[static_cast<std::size_t>(i)]);
-  });
+  const PreparedSource clips = with_choices(all_clips, choices);
   if (found.stretches > 0) found = survey(clips, progress);
   RegisteredSpace space = empty_space(found, options.space, found.orientations.references());
   std::vector<std::vector<Warp>> warps;
@@ -559,9 +581,7 @@ BuiltSpace extend_space(const RegisteredSpace& space, const PreparedSource& all_
   options.validate();
   // Kinds of sequences that the space has not met are cut at rests.
   const std::vector<RestChoice> choices = choose_all(all_clips, space, progress);
-  const PreparedSource clips = with_runs(all_clips, [&choices](int i, const std::vector<Run>& runs) {
-    return apply_choice(runs, choices[static_cast<std::size_t>(i)]);
-  });
+  const PreparedSource clips = with_choices(all_clips, choices);
   std::vector<std::vector<Warp>> warps(static_cast<std::size_t>(clips.count));
   // Functions of all curves together are what warps are searched against; spaces of other groupings take clips as they
   // are.

@@ -151,10 +151,10 @@ MeasuredError distance(const JointPositions& a, const JointPositions& b) {
   return out.error();
 }
 
-MeasuredError measure_error(const PreparedClip& clip, const RegisteredSpace& space, const EncodedClip& encoded,
+MeasuredError measure_error(const PreparedClip& clip, const ClipDecoder& decoder, const EncodedClip& encoded,
                             int level) {
   JointDistance out;
-  decode_in_parts(space, encoded, level, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
+  decoder.decode_in_parts(encoded, level, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
     const auto original = clip.curves.values.middleRows(first, rows.rows());
     out.add(joint_positions(clip_of_frames(clip.curves, original, first, clip.skeleton)),
             joint_positions(clip_of_frames(clip.curves, rows, first, clip.skeleton)));
@@ -186,7 +186,12 @@ class SpaceWriter {
  public:
   SpaceWriter(Library& library, const BuiltSpace& built, const ClipSpace& clips, const std::string& tree_hash,
               const Compute& compute)
-      : library_(library), built_(built), clips_(clips), tree_hash_(tree_hash), compute_(compute) {
+      : library_(library),
+        built_(built),
+        decoder_(built.space),
+        clips_(clips),
+        tree_hash_(tree_hash),
+        compute_(compute) {
     space_id_ = library.put_space(
         {.name = sequence_space_name(tree_hash), .tree_hash = tree_hash, .blob = pack_space(built.space)});
     library.put_space({.name = clip_space_name(tree_hash), .tree_hash = tree_hash, .blob = clips.pack()});
@@ -220,9 +225,9 @@ class SpaceWriter {
     built_.space.apply_references(prepared.curves.values);
     out.clip = encode(built_.space, prepared.curves, built_.runs_of(index, prepared.runs),
                       built_.warps[static_cast<std::size_t>(index)], compute_);
-    round_to_stored(out.clip);
+    round_to_stored(out.clip, built_.space);
     for (const int level : measured_levels(built_.space.levels())) {
-      out.clip.levels.push_back({level, measure_error(prepared, built_.space, out.clip, level)});
+      out.clip.levels.push_back({level, measure_error(prepared, decoder_, out.clip, level)});
     }
     out.clip.error = out.clip.levels.back().error;
     out.retrieval = clips_.vector_of(prepared.curves);
@@ -253,6 +258,7 @@ class SpaceWriter {
 
   Library& library_;
   const BuiltSpace& built_;
+  ClipDecoder decoder_;
   const ClipSpace& clips_;
   std::string tree_hash_;
   const Compute& compute_;
@@ -274,7 +280,7 @@ void transfer_clips(Library& library, std::int64_t space_id, const RegisteredSpa
     for (EncodedRun& run : clip.runs) {
       for (EncodedSequence& s : run.sequences) s.scores = to.of(s.cycles).transfer(s.scores, from.of(s.cycles));
     }
-    round_to_stored(clip);
+    round_to_stored(clip, to);
     // Its own curves are not there any more: errors of levels are not known any more, and with what the transfer moves
     // added, its error is never less than it is.
     const MeasuredError moved = distance(before, joint_positions(clip_from_curves(decode(to, clip), skeleton)));

@@ -130,6 +130,11 @@ EncodedClip LibraryView::encoded(const ClipRow& row, int functions) {
   return unpack_clip(packed, space(row.space_id), skeleton(row.skeleton_id), header, source, functions);
 }
 
+std::vector<LevelError> LibraryView::level_errors(const ClipRow& row) {
+  return unpack_level_errors(library_.clip_blob(row.id, ClipBlob::side), space(row.space_id),
+                             fmt::format("{} (clip {})", library_.path().string(), row.name));
+}
+
 ClipCurves LibraryView::curves(const ClipRow& row, int functions) {
   return decode(space(row.space_id), encoded(row, functions), functions);
 }

@@ -43,6 +43,10 @@ class LibraryView {
   [[nodiscard]] ClipCurves curves(const ClipRow& row, int functions = -1);
   [[nodiscard]] Clip clip(const ClipRow& row, int functions = -1);
 
+  // How far the joints of a clip are from those that were read, of the levels of detail that were measured; its scores are
+  // not looked at.
+  [[nodiscard]] std::vector<LevelError> level_errors(const ClipRow& row);
+
   // The fewest functions whose decoded clip is, at every joint and frame, within the given distance in cm of the clip
   // as it was read. Where the file it was read from is still there unchanged, that is measured; else the fewest of the
   // levels whose error was measured when the library was built; where these are not known (clips of before, and those

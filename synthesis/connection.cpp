@@ -32,17 +32,31 @@ constexpr int minima_refined = 5;
 constexpr double worth_refining = 2;  // cells that cost so many times the best are left
 constexpr int refinements = 6;
 constexpr int most_functions = 64;
-// What motions can be scored in: an orthonormal basis (trapezoid rule) of the span of 1, the mean and the functions, and
-// of s where functions vanish at the ends.
-SampleMatrix orthonormal_functions(const MotionSpace& space, int count) {
+// Mean and functions of the curves as they are: those of a pinned space vanish at the ends, and windows do not.
+SampleMatrix mean_and_functions(const MotionSpace& space, int count) {
   const auto group = std::ranges::max_element(space.groups(), {}, &FunctionGroup::variance);
-  const Eigen::Index given = space.options().pinned ? 3 : 2;
-  const auto wanted = std::min<Eigen::Index>(count, group->functions.cols() + given);
+  const CurveMoments& moments = space.moments()[static_cast<std::size_t>(group - space.groups().begin())];
+  const bool as_they_are = !space.options().pinned || moments.count() == 0;
+  Eigen::MatrixXd functions = group->functions;
+  Eigen::VectorXd mean = group->mean;
+  if (!as_they_are) {
+    FunctionalPca pca = FunctionalPcaWorkspace(space.points(), {.count = count}).fit(moments);
+    functions = std::move(pca.observed_functions);
+    mean = std::move(pca.observed_mean);
+  }
+  const auto kept = std::min<Eigen::Index>(count, functions.cols());
+  SampleMatrix out(space.points(), kept + 1);
+  out << mean, functions.leftCols(kept);
+  return out;
+}
+
+// What motions can be scored in: an orthonormal basis (trapezoid rule) of the span of 1, the mean and the functions.
+SampleMatrix orthonormal_functions(const MotionSpace& space, int count) {
+  const SampleMatrix found = mean_and_functions(space, count - 2);
+  const Eigen::Index wanted = found.cols() + 1;
   SampleMatrix columns(space.points(), wanted);
   columns.col(0).setOnes();
-  columns.col(1) = group->mean;
-  if (space.options().pinned) columns.col(2).setLinSpaced(space.points(), 0, 1);
-  columns.rightCols(wanted - given) = group->functions.leftCols(wanted - given);
+  columns.rightCols(wanted - 1) = found;
   const UniformSpline spline(std::move(columns));
   SampleMatrix at(function_points, wanted);
   for (int i = 0; i < function_points; ++i) {

@@ -78,6 +78,7 @@ PlaybackBasis::PlaybackBasis(const RegisteredSpace& space, int levels)
     : levels_(levels < 0 ? space.levels() : std::min(levels, space.levels())),
       by_component_(space.options().grouping != Grouping::per_joint_component),
       one_velocity_group_(space.plain().group_of(0) == space.plain().group_of(1)) {
+  if (space.options().pinned) left_out_.emplace(space);
   for (int c = 0; c < space.curves(); ++c) group_of_.push_back(space.plain().group_of(c));
   for (std::size_t set = 0; set < space.sets().size(); ++set) {
     sets_.push_back(space.has(static_cast<int>(set)) ? tables_of(space.sets()[set]) : Set{});
@@ -89,14 +90,13 @@ PlaybackBasis::Set PlaybackBasis::tables_of(const MotionSpace& space) const {
   for (int level = 0; level <= levels_; ++level) out.rows_at.push_back(space.rows_at(level));
   out.rows = out.rows_at.back();
   out.blocks = (out.rows + 1 + lanes - 1) / lanes;
-  const bool pinned = space.options().pinned;
   for (const FunctionGroup& group : space.groups()) {
-    const SampleMatrix cubics = cell_coefficients(entries_of(group, pinned, out.rows));
+    const SampleMatrix cubics = cell_coefficients(entries_of(group, space.options().pinned, out.rows));
     for (int block = 0; block < out.blocks; ++block) append(cubics, block, out.values);
   }
   for (int axis = 0; axis < (one_velocity_group_ ? 1 : 3); ++axis) {
     const FunctionGroup& group = space.groups()[static_cast<std::size_t>(space.group_of(axis))];
-    const std::vector<SampleMatrix> integrals = integrals_of(entries_of(group, pinned, out.rows));
+    const std::vector<SampleMatrix> integrals = integrals_of(entries_of(group, space.options().pinned, out.rows));
     std::vector<SampleMatrix> cubics;
     for (const SampleMatrix& integral : integrals) cubics.push_back(cell_coefficients(integral));
     for (int block = 0; block < out.blocks; ++block) {

@@ -13,11 +13,12 @@
 // 128 points and 32 functions takes 0.5 MB. One basis serves all clips of a space.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "kinespace/base/aligned.h"
-#include "kinespace/fpca/registered_space.h"
+#include "kinespace/fpca/left_out.h"
 #include "kinespace/fpca/warp.h"
 
 namespace kinespace {
@@ -31,6 +32,8 @@ class PlaybackBasis {
   explicit PlaybackBasis(const RegisteredSpace& space, int levels = -1);
 
   [[nodiscard]] int levels() const { return levels_; }
+  // How slopes are corrected at cuts where the ends of sequences are kept; null where they are not.
+  [[nodiscard]] const LeftOut* left_out() const { return left_out_ ? &*left_out_ : nullptr; }
   // Whether sequences of so many cycles can be played, and how: `set` below is that number.
   [[nodiscard]] bool has(int set) const { return set >= 0 && set < static_cast<int>(sets_.size()) && of(set).points > 0; }
   [[nodiscard]] int points(int set) const { return of(set).points; }
@@ -89,6 +92,7 @@ class PlaybackBasis {
   [[nodiscard]] std::size_t slot(int axis) const { return one_velocity_group_ ? 0 : static_cast<std::size_t>(axis); }
 
   int levels_ = 0;
+  std::optional<LeftOut> left_out_;
   bool by_component_ = false;
   bool one_velocity_group_ = false;
   std::vector<int> group_of_;

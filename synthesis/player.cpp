@@ -528,7 +528,7 @@ PlayerParts::PlayerParts(std::shared_ptr<const PlaybackBasis> basis_in, const En
       add_sequence(encoded, clip.rate_hz, start);
       start += encoded.travel.cast<double>();
     }
-    add_cuts(first, sequences.size());
+    add_cuts(first, run);
   }
   if (sequences.empty()) {
     throw Error(ErrorKind::usage, {.file = clip.name, .found = "a clip without sequences", .expected = "one or more"});
@@ -573,8 +573,9 @@ void PlayerParts::add_sequence(const EncodedSequence& encoded, double rate, cons
   sequences.push_back(out);
 }
 
-// The corrections at the cuts between sequences first .. last - 1 of one run, at every level.
-void PlayerParts::add_cuts(std::size_t first, std::size_t last) {
+// The corrections at the cuts of a run, whose sequences are those from `first`, at every level.
+void PlayerParts::add_cuts(std::size_t first, const EncodedRun& run) {
+  const std::size_t last = first + run.sequences.size();
   if (last - first < 2) return;
   const auto levels = static_cast<std::size_t>(basis->levels()) + 1;
   const std::size_t start = cuts.size();
@@ -598,7 +599,19 @@ void PlayerParts::add_cuts(std::size_t first, std::size_t last) {
       Eigen::Map<Eigen::RowVectorXf>(out, columns) = correction.value.head(columns).cast<float>();
       // Both neighbours end where the root is: there is no value to correct, only its slope.
       Eigen::Map<Eigen::RowVectorXf>(out + columns, columns + 4) = correction.slope.cast<float>();
+      if (basis->left_out() != nullptr) {
+        const auto& s = run.sequences;
+        put_slopes(basis->left_out()->slope(s[i - first], s[i - first + 1], static_cast<int>(level)), out + columns);
+      }
     }
+  }
+}
+
+// Slopes by curve into the columns of a correction; the root's place, last, has none.
+void PlayerParts::put_slopes(const Eigen::RowVectorXd& by_curve, float* out) const {
+  std::fill_n(out, rotation_floats() + 4, 0.0F);
+  for (Eigen::Index c = 3; c < by_curve.size(); ++c) {
+    out[(c - 3) % 4 * lanes + (c - 3) / 4] = static_cast<float>(by_curve(c));
   }
 }
 

@@ -111,8 +111,12 @@ std::string group_name(std::size_t i) {
   return fmt::format("group {}", i);
 }
 
-float stored_steps(float score) {
-  return static_cast<float>(std::round(static_cast<double>(score) / score_step));
+double step_of(const MotionSpace& set) {
+  return score_step / std::sqrt(set.options().pace);
+}
+
+float stored_steps(float score, double step) {
+  return static_cast<float>(std::round(static_cast<double>(score) / step));
 }
 
 // The rows of a sequence's scores that a level of detail has and the one before it has not. A row that the sequence
@@ -149,7 +153,8 @@ void for_each_row(Clip& clip, const RegisteredSpace& space, int level, const Vis
 Bytes score_block(const EncodedClip& clip, const RegisteredSpace& space, int level) {
   std::vector<float> steps;
   for_each_row(clip, space, level, [&](const EncodedSequence& s, int row) {
-    for (Eigen::Index c = 0; c < s.scores.cols(); ++c) steps.push_back(stored_steps(s.scores(row, c)));
+    const double step = step_of(space.of(s.cycles));
+    for (Eigen::Index c = 0; c < s.scores.cols(); ++c) steps.push_back(stored_steps(s.scores(row, c), step));
   });
   return pack_floats(steps);
 }
@@ -216,7 +221,8 @@ void read_level(std::span<const std::byte> block, const RegisteredSpace& space, 
   std::size_t at = 0;
   for_each_row(clip, space, level, [&](EncodedSequence& s, int number) {
     auto row = s.scores.row(number);
-    row = Eigen::Map<const Eigen::RowVectorXf>(steps.data() + at, row.size()) * static_cast<float>(score_step);
+    const auto step = static_cast<float>(step_of(space.of(s.cycles)));
+    row = Eigen::Map<const Eigen::RowVectorXf>(steps.data() + at, row.size()) * step;
     if (!row.allFinite()) throw Error(ErrorKind::bad_input, {.file = source, .found = "a score that is no number"});
     at += curves;
   });
@@ -438,7 +444,20 @@ std::vector<LevelError> unpack_levels(ByteReader in, int levels) {
   return out;
 }
 
+std::vector<LevelError> level_errors_of(const Bitstream& side, const RegisteredSpace& space,
+                                        const std::string& source) {
+  if (!side.has_section("levels")) return {};
+  return unpack_levels(ByteReader(side.section("levels"), source), space.levels());
+}
+
 }  // namespace
+
+std::vector<LevelError> unpack_level_errors(std::span<const std::byte> bytes, const RegisteredSpace& space,
+                                            const std::string& source) {
+  const Bitstream side = Bitstream::parse(bytes, source);
+  side.require_kind("clip-side");
+  return level_errors_of(side, space, source);
+}
 
 PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   PackedClip out;
@@ -460,13 +479,16 @@ PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   return out;
 }
 
-void round_to_stored(EncodedClip& clip) {
+void round_to_stored(EncodedClip& clip, const RegisteredSpace& space) {
   for (EncodedRun& run : clip.runs) {
-    for (EncodedSequence& s : run.sequences) {
+    for (std::size_t k = 0; k < run.sequences.size(); ++k) {
+      EncodedSequence& s = run.sequences[k];
+      const double step = step_of(space.of(s.cycles));
       for (Eigen::Index i = 0; i < s.scores.size(); ++i) {
         float& score = s.scores.data()[i];
-        score = stored_steps(score) * static_cast<float>(score_step);
+        score = stored_steps(score, step) * static_cast<float>(step);
       }
+      if (k > 0 && space.options().pinned) s.scores.row(0) = run.sequences[k - 1].scores.row(1);
     }
   }
 }
@@ -481,7 +503,7 @@ EncodedClip unpack_clip(const PackedClip& packed, const RegisteredSpace& space, 
   const Bitstream side = Bitstream::parse(packed.side, source);
   side.require_kind("clip-side");
   unpack_side(ByteReader(side.section("side"), source), clip, skeleton, source);
-  if (side.has_section("levels")) clip.levels = unpack_levels(ByteReader(side.section("levels"), source), space.levels());
+  clip.levels = level_errors_of(side, space, source);
 
   const Bitstream vectors = Bitstream::parse_prefix(packed.vectors, source);
   vectors.require_kind("clip-vectors");

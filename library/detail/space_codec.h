@@ -16,7 +16,7 @@
 
 namespace kinespace {
 
-inline constexpr double score_step = 1e-4;
+inline constexpr double score_step = 1e-4;  // over the root of a set's pace: more scores add up to no more error
 
 [[nodiscard]] Bytes pack_skeleton(const Skeleton& skeleton);
 [[nodiscard]] Skeleton unpack_skeleton(std::span<const std::byte> bytes, const std::string& source);
@@ -31,10 +31,14 @@ struct PackedClip {
 };
 [[nodiscard]] PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space);
 // What the clip is after pack_clip and unpack_clip: its scores are in the steps that they are stored in.
-void round_to_stored(EncodedClip& clip);
+void round_to_stored(EncodedClip& clip, const RegisteredSpace& space);
 // At level of detail `functions` at most (all when < 0), of a stream that may end early. `header` gives name, rate and
 // frames.
 [[nodiscard]] EncodedClip unpack_clip(const PackedClip& packed, const RegisteredSpace& space, const Skeleton& skeleton,
                                       const EncodedClip& header, const std::string& source, int functions = -1);
+
+// What `side` says of a clip's levels of detail alone; empty where they were not measured.
+[[nodiscard]] std::vector<LevelError> unpack_level_errors(std::span<const std::byte> side, const RegisteredSpace& space,
+                                                          const std::string& source);
 
 }  // namespace kinespace

@@ -76,7 +76,8 @@ struct PlayerParts {
 
  private:
   void add_sequence(const EncodedSequence& encoded, double rate_hz, const Eigen::Vector3d& start);
-  void add_cuts(std::size_t first, std::size_t last);
+  void add_cuts(std::size_t first, const EncodedRun& run);
+  void put_slopes(const Eigen::RowVectorXd& by_curve, float* out) const;
   void index_times();
 };
 

@@ -4,7 +4,7 @@
     read_library_test.py BUILD_FOLDER
 
 Builds small libraries of sample motions and compares what the script prints with `kinespace info --json`; then holds the numbers that it reads to what
-defines them: eigenfunctions are orthonormal, and the mean square of all scores in a function is its eigenvalue. First the comparison is shown to
+defines them: eigenfunctions are orthonormal, the mean square of all scores in a function is its eigenvalue, and neighbours share their ends. First the comparison is shown to
 fail on what differs.
 """
 import copy
@@ -26,14 +26,18 @@ import read_library  # noqa: E402
 def printed(text):
     """What the script printed, under the keys of `kinespace info --json`."""
     clips = [{"name": name, "frames": int(frames)} for name, frames in re.findall(r"^  (\S+) (\d+) frames ", text, re.MULTILINE)]
-    number = lambda key: float(re.search(rf"^ *{key} (\S+)$", text, re.MULTILINE)[1])
-    return {"clips": number("clips"), "functions": number("functions"), "variance": number("variance"), "clip_list": clips}
+    numbers_of = lambda key: [float(value) for value in re.findall(rf"^ *{key} (\S+)$", text, re.MULTILINE)]
+    sets = [{"cycles": c, "functions": f, "variance": v} for c, f, v in zip(*map(numbers_of, ("cycles", "functions", "variance")))]
+    return {"clips": numbers_of("clips")[0], "sets": sets, "clip_list": clips}
 
 
 def differences(shown, info):
-    out = [f"{key}: printed {shown[key]}, it is {info[key]}" for key in ("clips", "functions") if shown[key] != info[key]]
-    if abs(shown["variance"] - info["variance"]) > 1.1e-9:
-        out.append(f"variance: printed {shown['variance']}, it is {info['variance']}")
+    out = [f"clips: printed {shown['clips']}, it is {info['clips']}"] if shown["clips"] != info["clips"] else []
+    sets = info["spaces"][0]["sets"]
+    if len(shown["sets"]) != len(sets):
+        out.append(f"{len(shown['sets'])} function sets printed, there are {len(sets)}")
+    for a, b in zip(shown["sets"], sets):
+        out += [f"{key}: printed {a[key]}, it is {b[key]}" for key in a if abs(a[key] - b[key]) > 1.1e-9]
     if shown["clip_list"] != [{"name": c["name"], "frames": c["frames"]} for c in info["clip_list"]]:
         out.append("the list of clips differs")
     return out
@@ -42,9 +46,12 @@ def differences(shown, info):
 def self_test(shown, info):
     """[a change that the comparison does not see]"""
     unseen = []
-    for key, value in (("clips", 1), ("functions", 1), ("variance", 1e-8)):
+    wrong = copy.deepcopy(info)
+    wrong["clips"] += 1
+    unseen += [] if differences(shown, wrong) else ["clips"]
+    for key, value in (("cycles", 1), ("functions", 1), ("variance", 1e-8)):
         wrong = copy.deepcopy(info)
-        wrong[key] += value
+        wrong["spaces"][0]["sets"][-1][key] += value
         unseen += [] if differences(shown, wrong) else [key]
     wrong = copy.deepcopy(info)
     wrong["clip_list"][0]["frames"] += 1
@@ -56,36 +63,45 @@ def group_of(curve, groups):
     return 0 if groups == 1 else component if groups == 7 else curve
 
 
-def numbers(path):
-    """What is wrong with the eigenfunctions and the motion vectors as the script reads them."""
-    library = read_library.sqlite3.connect(path)
-    curves, groups = read_library.space(library.execute("SELECT blob FROM spaces WHERE name LIKE 'sequences %'").fetchone()[0])
-    points = len(groups[0][1])
-    weights = [(0.5 if i in (0, points - 1) else 1) / (points - 1) for i in range(points)]
-    for _, _, _, functions in groups:
+def orthonormal(of):
+    for _, _, mean, _, functions in of.groups:
+        points = len(mean)
+        weights = [(0.5 if i in (0, points - 1) else 1) / (points - 1) for i in range(points)]
         for i, a in enumerate(functions):
-            for j, b in enumerate(functions):
+            for j, b in enumerate(functions[: i + 1]):
                 product = sum(x * y * w for x, y, w in zip(a, b, weights))
                 if abs(product - (i == j)) > 1e-10:
                     yield f"functions {i} and {j} are not orthonormal: {product}"
-    squares = [[0.0] * len(group[2]) for group in groups]
-    counts = [0] * len(groups)
+
+
+def numbers(path):
+    """What is wrong with the eigenfunctions and the motion vectors as the script reads them."""
+    library = read_library.sqlite3.connect(path)
+    sets = read_library.space(library.execute("SELECT blob FROM spaces WHERE name LIKE 'sequences %'").fetchone()[0])
+    for of in sets.values():
+        yield from orthonormal(of)
+    squares = {cycles: [[0.0] * len(group[3]) for group in of.groups] for cycles, of in sets.items()}
+    counts = {cycles: [0] * len(of.groups) for cycles, of in sets.items()}
     rows = "SELECT frames, w.blob, v.blob FROM clips c JOIN clip_warps w ON w.clip_id = c.id JOIN clip_vectors v ON v.clip_id = c.id"
     for frames, warps, vectors in library.execute(rows):
-        parts = read_library.sequences(warps)
-        if parts[0][0] != 0 or parts[-1][1] != frames - 1:
-            yield f"sequences from {parts[0][0]} to {parts[-1][1]} in {frames} frames"
-        for k, function in enumerate(read_library.scores(vectors, len(parts), curves)):
-            for c in range(curves):
-                g = group_of(c, len(groups))
-                if k < len(squares[g]):
-                    squares[g][k] += sum(vector[c] ** 2 for vector in function)
-        for c in range(curves):
-            counts[group_of(c, len(groups))] += len(parts)
-    for (_, _, eigenvalues, _), sums, count in zip(groups, squares, counts):
-        for k, (value, total) in enumerate(zip(eigenvalues, sums)):
-            if abs(total / (count - 1) - value) > 0.03 * value + 1e-8:  # scores are kept in steps of 1e-4
-                yield f"function {k}: eigenvalue {value}, mean square of the scores {total / (count - 1)}"
+        runs = read_library.sequences(warps)
+        if runs[0][0][0] != 0 or runs[-1][-1][1] != frames - 1:
+            yield f"sequences from {runs[0][0][0]} to {runs[-1][-1][1]} in {frames} frames"
+        parts = [part for run in runs for part in run]
+        for (_, _, cycles, _), vector in zip(parts, read_library.scores(vectors, runs, sets)):
+            of = sets[cycles]
+            for c in range(of.curves):
+                g = group_of(c, len(of.groups))
+                counts[cycles][g] += 1
+                for k in range(len(squares[cycles][g])):
+                    squares[cycles][g][k] += vector[2 * of.pinned + k][c] ** 2
+        for run in runs:
+            yield from (f"a sequence ends at {a[1]}, the next begins at {b[0]}" for a, b in zip(run, run[1:]) if a[1] != b[0])
+    for cycles, of in sets.items():
+        for (_, _, _, eigenvalues, _), sums, count in zip(of.groups, squares[cycles], counts[cycles]):
+            for k, (value, total) in enumerate(zip(eigenvalues, sums)):
+                if count and abs(total / max(1, count - 1) - value) > 0.03 * value + 1e-8:  # scores are kept in steps of 1e-4
+                    yield f"{cycles} cycles, function {k}: eigenvalue {value}, mean square of the scores {total / (count - 1)}"
 
 
 def findings(folder, environment):

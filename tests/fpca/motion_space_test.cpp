@@ -22,11 +22,19 @@ Clip decode_sample(const BuiltSpace& built, std::size_t i, int n) {
   return clip_from_curves(decode(built.space, encode_sample(built, i), n), sample_clips()[i].skeleton);
 }
 
-TEST(MotionSpace, functions_are_orthonormal_in_the_inner_product_of_the_scores) {
-  const FunctionGroup& group = sample_space().space.groups().front();
-  const Eigen::VectorXd w = trapezoid_weights(sample_space().space.points(), 1.0);
-  const Eigen::MatrixXd gram = group.functions.transpose() * w.asDiagonal() * group.functions;
-  EXPECT_LT((gram - Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff(), 1e-12);
+TEST(MotionSpace, functions_of_every_set_are_orthonormal_in_the_inner_product_of_the_scores) {
+  int sets = 0;
+  for (const MotionSpace& set : sample_space().space.sets()) {
+    if (set.functions() == 0) continue;
+    const FunctionGroup& group = set.groups().front();
+    const Eigen::VectorXd w = trapezoid_weights(set.points(), 1.0);
+    const Eigen::MatrixXd gram = group.functions.transpose() * w.asDiagonal() * group.functions;
+    EXPECT_LT((gram - Eigen::MatrixXd::Identity(gram.rows(), gram.cols())).cwiseAbs().maxCoeff(), 1e-12);
+    EXPECT_LT(group.functions.row(0).cwiseAbs().maxCoeff(), 1e-6) << "functions vanish where ends are kept";
+    EXPECT_LT(group.functions.bottomRows(1).cwiseAbs().maxCoeff(), 1e-6);
+    ++sets;
+  }
+  EXPECT_GE(sets, 2) << "the sample motions have walks";
 }
 
 TEST(MotionSpace, all_functions_give_every_clip_back) {
@@ -57,33 +65,53 @@ TEST(MotionSpace, a_clip_ends_where_it_ended_at_any_level_of_detail) {
 }
 
 TEST(MotionSpace, the_error_of_leaving_functions_out_is_known_from_the_scores) {
-  const MotionSpace& space = sample_space().space;
-  const EncodedClip clip = encode_sample(sample_space(), 1);
-  const ScoreMatrix& scores = clip.runs[0].sequences[0].scores;
-  const SampleMatrix difference = space.samples(scores) - space.samples(scores, 4);
-  const Eigen::VectorXd w = trapezoid_weights(space.points(), 1.0);
+  const EncodedSequence sequence = encode_sample(sample_space(), 1).runs[0].sequences[0];
+  const MotionSpace& set = sample_space().space.of(sequence.cycles);
+  const SampleMatrix difference = set.samples(sequence.scores) - set.samples(sequence.scores, 4);
+  const Eigen::VectorXd w = trapezoid_weights(set.points(), 1.0);
   const Eigen::VectorXd measured = (difference.cwiseAbs2().transpose() * w).cwiseSqrt();
-  EXPECT_LT((measured - space.truncation_error(scores, 4)).cwiseAbs().maxCoeff(), 1e-6);
+  EXPECT_LT((measured - set.truncation_error(sequence.scores, 4)).cwiseAbs().maxCoeff(), 1e-6);
 }
 
-TEST(MotionSpace, the_error_bound_holds) {
-  const MotionSpace& space = sample_space().space;
+TEST(MotionSpace, cuts_are_exact_at_every_level_of_detail) {
   for (std::size_t i = 0; i < sample_clips().size(); ++i) {
     const EncodedClip clip = encode_sample(sample_space(), i);
-    const JointPositions all = joint_positions(clip_from_curves(decode(space, clip), sample_clips()[i].skeleton));
-    for (const int n : {4, 8}) {
-      const JointPositions some = joint_positions(clip_from_curves(decode(space, clip, n), sample_clips()[i].skeleton));
-      double squares = 0;
-      for (std::size_t p = 0; p < all.values.size(); ++p) squares += (all.values[p] - some.values[p]).squaredNorm();
-      EXPECT_LE(std::sqrt(squares / static_cast<double>(all.values.size())),
-                truncation_bound_cm(space, sample_clips()[i].skeleton, clip, n))
-          << sample_clips()[i].name;
+    ClipCurves curves = prepared_samples()[i].curves;
+    sample_space().space.apply_references(curves.values);
+    for (const int level : {0, 1, 3}) {
+      const ClipCurves decoded = decode(sample_space().space, clip, level);
+      for (const EncodedRun& run : clip.runs) {
+        for (const EncodedSequence& s : run.sequences) {
+          const auto difference = decoded.values.row(s.first) - curves.values.row(s.first);
+          EXPECT_LT(difference.tail(difference.size() - 3).cwiseAbs().maxCoeff(), 1e-6) << curves.name << " " << level;
+        }
+      }
     }
   }
 }
 
+TEST(MotionSpace, levels_of_a_set_take_numbers_by_its_pace) {
+  const Skeleton& skeleton = sample_clips()[0].skeleton;
+  MotionSpace set(skeleton, {.functions = 9, .pinned = true, .cycles = 3, .pace = 2.5}, 40);
+  std::vector<SampleMatrix> samples;
+  for (int i = 0; i < 20; ++i) {
+    SampleMatrix& m = samples.emplace_back(40, set.curves());
+    for (Eigen::Index k = 0; k < m.size(); ++k) m.data()[k] = std::sin(0.1 * static_cast<double>(k * (i + 3)));
+  }
+  auto moments = set.empty_moments();
+  set.accumulate(samples, moments);
+  set.fit(std::move(moments));
+  ASSERT_EQ(set.rows(), 11) << "two ends and nine functions";
+  EXPECT_EQ(set.rows_at(0), 2) << "the ends alone";
+  EXPECT_EQ(set.rows_at(1), 4) << "2.5 numbers a curve, rounded up, one of them the end that neighbours share";
+  EXPECT_EQ(set.rows_at(2), 6);
+  EXPECT_EQ(set.rows_at(-1), 11);
+  EXPECT_EQ(set.levels(), 4);
+  EXPECT_EQ(set.rows_at(4), 11);
+}
+
 TEST(MotionSpace, building_from_two_halves_and_merging_equals_building_from_all) {
-  const MotionSpace& space = sample_space().space;
+  const MotionSpace& space = sample_space().space.plain();
   std::vector<SampleMatrix> samples;
   for (const PreparedClip& clip : prepared_samples()) {
     SampleMatrix values = clip.curves.values;
@@ -146,20 +174,38 @@ TEST(MotionSpace, short_and_constant_clips_can_be_encoded) {
   for (std::size_t i = prepared_samples().size(); i < clips.size(); ++i) {
     ClipCurves curves = clips[i].curves;
     built.space.apply_references(curves.values);
-    const ClipCurves decoded = decode(built.space, encode(built.space, curves, clips[i].runs, built.warps[i]));
+    const ClipCurves decoded = decode(
+        built.space, encode(built.space, curves, built.runs_of(static_cast<int>(i), clips[i].runs), built.warps[i]));
     EXPECT_LT((decoded.values - curves.values).cwiseAbs().maxCoeff(), 0.01) << i;
   }
 }
 
 TEST(MotionSpace, alignment_lowers_what_the_first_functions_leave) {
   SpaceBuildOptions options;
+  options.alignment.on_trial = false;
+  const BuiltSpace aligned = build_space(source_of(prepared_samples()), options);
   options.align = false;
   const BuiltSpace plain = build_space(source_of(prepared_samples()), options);
-  const auto left = [](const MotionSpace& space, int n) {
-    const FunctionGroup& g = space.groups().front();
-    return g.variance - g.eigenvalues.head(n).sum();
+  const auto left = [](const RegisteredSpace& space, int n) {
+    const FunctionGroup& g = space.plain().groups().front();
+    return g.left + g.eigenvalues.tail(g.eigenvalues.size() - n).sum();
   };
-  EXPECT_LT(left(sample_space().space, 10), left(plain.space, 10));
+  EXPECT_TRUE(aligned.space.warped());
+  EXPECT_LT(left(aligned.space, 10), left(plain.space, 10));
+}
+
+TEST(MotionSpace, warps_that_win_nothing_on_held_out_clips_are_not_kept) {
+  // Bodies at rest, each in another pose: there is no timing to align.
+  std::vector<PreparedClip> clips;
+  for (int i = 0; i < 20; ++i) {
+    const Clip& moving = sample_clips()[static_cast<std::size_t>(i) % sample_clips().size()];
+    const PreparedClip pose = prepare(slice(moving, i, 1));
+    PreparedClip clip = prepare(make_clip("rest", moving.skeleton, 60, 60));
+    clip.curves.name = "rest " + std::to_string(i);
+    for (Eigen::Index f = 0; f < 60; ++f) clip.curves.values.row(f) = pose.curves.values.row(0);
+    clips.push_back(std::move(clip));
+  }
+  EXPECT_FALSE(build_space(source_of(clips), {}).space.warped());
 }
 
 TEST(MotionSpace, an_opencl_device_finds_the_same_functions_and_scores) {
@@ -173,20 +219,21 @@ TEST(MotionSpace, an_opencl_device_finds_the_same_functions_and_scores) {
   options.space.functions = 8;
   const BuiltSpace here = build_space(source_of(prepared_samples()), options);
   const BuiltSpace there = build_space(source_of(prepared_samples()), options, device);
-  const auto& a = here.space.groups().front();
-  const auto& b = there.space.groups().front();
+  const auto& a = here.space.plain().groups().front();
+  const auto& b = there.space.plain().groups().front();
   EXPECT_LT((a.functions - b.functions).cwiseAbs().maxCoeff(), 1e-3);
   EXPECT_LT((a.eigenvalues - b.eigenvalues).cwiseAbs().maxCoeff(), 1e-5 * a.eigenvalues(0));
   ClipCurves curves = prepared_samples()[0].curves;
   here.space.apply_references(curves.values);
-  const EncodedClip cpu = encode(here.space, curves, prepared_samples()[0].runs);
-  const EncodedClip gpu = encode(here.space, curves, prepared_samples()[0].runs, {}, device);
+  const auto runs = here.runs_of(0, prepared_samples()[0].runs);
+  const EncodedClip cpu = encode(here.space, curves, runs);
+  const EncodedClip gpu = encode(here.space, curves, runs, {}, device);
   EXPECT_LT((cpu.runs[0].sequences[0].scores - gpu.runs[0].sequences[0].scores).cwiseAbs().maxCoeff(), 1e-4);
 }
 
 TEST(SpaceCodec, a_space_comes_back_bit_for_bit) {
   const Bytes bytes = pack_space(sample_space().space);
-  const MotionSpace back = unpack_space(bytes, "test");
+  const RegisteredSpace back = unpack_registered_space(bytes, "test");
   EXPECT_EQ(pack_space(back), bytes);
 }
 
@@ -194,7 +241,7 @@ TEST(SpaceCodec, rounding_to_what_is_stored_is_what_storing_does) {
   EncodedClip clip = encode_sample(sample_space(), 0);
   const PackedClip packed = pack_clip(clip, sample_space().space);
   const EncodedClip back = unpack_clip(packed, sample_space().space, sample_clips()[0].skeleton, clip, "test");
-  round_to_stored(clip);
+  round_to_stored(clip, sample_space().space);
   for (std::size_t r = 0; r < clip.runs.size(); ++r) {
     for (std::size_t i = 0; i < clip.runs[r].sequences.size(); ++i) {
       EXPECT_EQ(clip.runs[r].sequences[i].scores, back.runs[r].sequences[i].scores);

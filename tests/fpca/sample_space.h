@@ -35,7 +35,7 @@ inline const BuiltSpace& sample_space() {
 inline EncodedClip encode_sample(const BuiltSpace& built, std::size_t i) {
   ClipCurves curves = prepared_samples()[i].curves;
   built.space.apply_references(curves.values);
-  return encode(built.space, curves, prepared_samples()[i].runs, built.warps[i]);
+  return encode(built.space, curves, built.runs_of(static_cast<int>(i), prepared_samples()[i].runs), built.warps[i]);
 }
 
 }  // namespace kinespace::test

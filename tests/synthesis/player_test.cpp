@@ -18,17 +18,18 @@ namespace {
 
 // A space and the clips it was made of, encoded with their warps.
 struct Encoded {
-  MotionSpace space;
+  RegisteredSpace space;
   std::vector<EncodedClip> clips;
 };
 
-Encoded encode_all(const std::vector<PreparedClip>& clips, const SpaceBuildOptions& options = {}) {
+Encoded encode_all(const std::vector<PreparedClip>& clips, SpaceBuildOptions options = {}) {
+  options.alignment.on_trial = false;
   BuiltSpace built = build_space(source_of(clips), options);
   Encoded out{std::move(built.space), {}};
   for (std::size_t i = 0; i < clips.size(); ++i) {
     ClipCurves curves = clips[i].curves;
     out.space.apply_references(curves.values);
-    out.clips.push_back(encode(out.space, curves, clips[i].runs, built.warps[i]));
+    out.clips.push_back(encode(out.space, curves, built.runs_of(static_cast<int>(i), clips[i].runs), built.warps[i]));
   }
   return out;
 }
@@ -85,7 +86,7 @@ void compare(const Pose& a, const Pose& b, Difference& out) {
 }
 
 // Against decode() at all frames.
-Difference against_decode(const MotionSpace& space, const EncodedClip& clip, int functions) {
+Difference against_decode(const RegisteredSpace& space, const EncodedClip& clip, int functions) {
   const Player player(space, clip);
   const ClipCurves curves = decode(space, clip, functions);
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(curves.placement.heading_rad, Eigen::Vector3d::UnitY()));
@@ -107,9 +108,13 @@ Difference against_decode(const MotionSpace& space, const EncodedClip& clip, int
 
 void expect_decoded(const Encoded& encoded) {
   bool warped = false;
+  bool cyclic = false;
   for (const EncodedClip& clip : encoded.clips) {
     for (const EncodedRun& run : clip.runs) {
-      for (const EncodedSequence& s : run.sequences) warped = warped || !s.warp.is_identity();
+      for (const EncodedSequence& s : run.sequences) {
+        warped = warped || !s.warp.is_identity();
+        cyclic = cyclic || s.cycles > 1;
+      }
     }
     for (const int functions : {0, 1, 3, 5, 12, -1}) {
       const Difference difference = against_decode(encoded.space, clip, functions);
@@ -118,6 +123,7 @@ void expect_decoded(const Encoded& encoded) {
     }
   }
   EXPECT_TRUE(warped) << "no sequence with a warp was tried";
+  EXPECT_TRUE(cyclic) << "no sequence of several cycles was tried";
 }
 
 TEST(Player, frames_of_sample_clips_are_those_of_decoding) {

@@ -122,7 +122,7 @@ TEST_F(Windows, distances_are_those_of_the_curves) {
     const ClipCurves curves = view.curves(row);
     stretches.push_back(window_samples(curves, 0, curves.frames() - 1, 0, options));
   }
-  const MotionSpace& space = view.space(rows.front().space_id);
+  const MotionSpace& space = view.space(rows.front().space_id).plain();
   const auto windows = WindowSpace::fit(stretches, space.skeleton(), space.references(), options);
   const Eigen::VectorXd weights = trapezoid_weights(samples, 1.0);
   for (const WindowSamples& stretch : stretches) {

@@ -1,0 +1,36 @@
+// What the functions that a level of detail leaves out would add in the frames beside a cut: by so much its slopes there
+// differ from those of the motion.
+//
+// In a pinned space neighbours agree at their cut at every level, but their slopes agree only with all functions. The
+// scores say by how much they do not, so a coarse level can be given the very change of slope that the motion has: nothing
+// is guessed, and with all functions nothing is changed.
+#pragma once
+
+#include <vector>
+
+#include "kinespace/fpca/cut_join.h"
+#include "kinespace/fpca/encoding.h"
+
+namespace kinespace {
+
+class LeftOut {
+ public:
+  explicit LeftOut(const RegisteredSpace& space);
+
+  // The correction (fpca/cut_join.h) between two neighbours of a run at a level of detail, by curve; 0 for the root's
+  // place, whose slope is the velocity and is kept.
+  [[nodiscard]] Eigen::RowVectorXd slope(const EncodedSequence& left, const EncodedSequence& right, int level) const;
+
+ private:
+  struct Set {
+    int points = 0;
+    std::vector<int> rows_at;              // by level
+    std::vector<UniformSpline> functions;  // by group
+  };
+  void add_beside(const EncodedSequence& sequence, double own_time, int level, Eigen::RowVectorXd& out) const;
+
+  std::vector<Set> sets_;
+  std::vector<int> group_of_;  // by curve
+};
+
+}  // namespace kinespace
