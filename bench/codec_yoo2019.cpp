@@ -136,7 +136,8 @@ void add_figure_9(const std::string& name, const VectorSpace& data, BenchReport&
       const auto needed = std::ranges::find_if(left, [&](double e) { return e <= error; }) - left.begin();
       return raw / (4 * std::max(1.0, static_cast<double>(needed)) * data.curves);
     };
-    const std::array<double, 4> ratios{raw / (4 * numbers), raw / (4 * (numbers + (n + 1.0) * data.space->plain().points())),
+    const std::array<double, 4> ratios{raw / (4 * numbers),
+                                       raw / (4 * (numbers + (n + 1.0) * data.space->plain().points())),
                                        analytic(data.left[1]), analytic(data.left[2])};
     table.rows.push_back({static_cast<double>(n), ratios[0], ratios[1], ratios[2], ratios[3],
                           std::sqrt(std::max(error, 0.0) / data.curves)});

@@ -230,13 +230,15 @@ DataSet cut_again(const DataSet& data, const SequenceOptions& options) {
 DataSet cut_windows(const DataSet& data, double length_s) {
   DataSet out = cut_again(data, {.most_cycles = 0});
   for (PreparedClip& clip : out.prepared) {
-    const int last = clip.curves.frames() - 1;
-    const auto windows = std::max(1, static_cast<int>(std::lround(last / clip.curves.rate_hz / length_s)));
-    Run run{{0}};
-    for (int i = 1; i <= windows && last > 0; ++i) {
-      run.cuts.push_back(static_cast<int>(std::lround(static_cast<double>(i) * last / windows)));
+    for (Run& run : clip.runs) {
+      const int first = run.cuts.front();
+      const int frames = run.cuts.back() - first;
+      const auto windows = std::max(1, static_cast<int>(std::lround(frames / clip.curves.rate_hz / length_s)));
+      run = {{first}};
+      for (int i = 1; i <= windows && frames > 0; ++i) {
+        run.cuts.push_back(first + static_cast<int>(std::lround(static_cast<double>(i) * frames / windows)));
+      }
     }
-    clip.runs = {std::move(run)};
   }
   return out;
 }
@@ -258,10 +260,11 @@ struct MeanLength {
   [[nodiscard]] double mean() const { return sequences > 0 ? seconds / sequences : 0; }
 };
 
-MeanLength length_of(const DataSet& data, int cycles) {
+MeanLength length_of(const DataSet& data, const BuiltSpace& built, int cycles) {
   MeanLength out;
-  for (const PreparedClip& clip : data.prepared) {
-    for (const Run& run : clip.runs) {
+  for (std::size_t clip_number = 0; clip_number < data.prepared.size(); ++clip_number) {
+    const PreparedClip& clip = data.prepared[clip_number];
+    for (const Run& run : built.runs_of(static_cast<int>(clip_number), clip.runs)) {
       for (int i = 0; i < run.sequence_count(); ++i) {
         if (run.cycles_of(i) != cycles) continue;
         out.seconds += (run.last_frame(i) - run.first_frame(i)) / clip.curves.rate_hz;
@@ -279,8 +282,7 @@ struct RegistrationBars {
 };
 
 // What registration is worth: cut at cycles, against as many equal windows (build --no-align).
-void registration_rows(const DataSet& data, const RegistrationBars& bars, const Compute& compute,
-                       BenchReport& report) {
+void registration_rows(const DataSet& data, const RegistrationBars& bars, const Compute& compute, BenchReport& report) {
   const auto add = [&](const std::string& name, double value, const char* unit, std::optional<double> bar) {
     report.results.push_back({.name = name, .data = data.name, .value = value, .unit = unit, .bar = bar});
   };
@@ -292,14 +294,14 @@ void registration_rows(const DataSet& data, const RegistrationBars& bars, const 
   double cyclic = 0;
   double all = 0;
   for (int cycles = 0; cycles <= SequenceOptions{}.most_cycles; ++cycles) {
-    const double seconds = length_of(data, cycles).seconds;
+    const double seconds = length_of(data, registered, cycles).seconds;
     all += seconds;
     if (cycles > 0) cyclic += seconds;
   }
   add("share of motion in whole cycles", 100 * cyclic / all, "%", {});
   const int three = SequenceOptions{}.most_cycles;
   if (registered.space.has(three)) {
-    const double length = length_of(data, three).mean();
+    const double length = length_of(data, registered, three).mean();
     const DataSet same_length = cut_windows(data, length);
     const BuiltSpace held_against = build_space(source_of(same_length.prepared), options, compute);
     add("mean length of three cycles", length, "s", {});

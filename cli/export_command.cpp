@@ -46,8 +46,9 @@ void run_export(const ExportOptions& options, Session& session) {
     level = library.level_for_error(row, *options.max_error_cm);
     functions = level->functions;
     if (!level->from_the_file) {
-      session.note("the file that the clip came from is not there unchanged: errors are those measured when the library "
-                   "was built");
+      session.note(
+          "the file that the clip came from is not there unchanged: its error is that measured when the library "
+          "was built, or never less");
     }
   }
   const EncodedClip encoded = library.encoded(row);

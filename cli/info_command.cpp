@@ -68,10 +68,11 @@ Json describe_space(LibraryView& view, const SpaceRow& row) {
   const RegisteredSpace& space = view.space(row.id);
   Json sets = Json::array();
   for (const MotionSpace& set : space.sets()) {
-    if (set.functions() == 0) continue;
+    if (!space.has(set.options().cycles)) continue;
     sets.push_back({{"cycles", set.options().cycles},
                     {"points", set.points()},
                     {"functions", set.function_count()},
+                    {"functions_of_a_curve", set.functions()},
                     {"variance", set.variance_covered()},
                     {"movement", set.movement_covered()}});
   }

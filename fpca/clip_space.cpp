@@ -118,7 +118,12 @@ ClipSpace ClipSpace::unpack(std::span<const std::byte> bytes, const std::string&
   const Bitstream stream = Bitstream::parse(bytes, source);
   stream.require_kind("clip-space");
   const double scale = stream.number_option("travel_scale", 0, 1e12);
-  return {unpack_space(stream.section("space"), source), scale};
+  MotionSpace space = unpack_space(stream.section("space"), source);
+  if (space.options().pinned || space.options().pace != 1 || space.options().cycles != 0) {
+    throw Error(ErrorKind::bad_input,
+                {.file = source, .found = "a space of sequences", .expected = "a space of whole clips"});
+  }
+  return {std::move(space), scale};
 }
 
 std::vector<float> distance_weights(const Skeleton& skeleton) {

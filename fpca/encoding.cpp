@@ -26,8 +26,8 @@ SampleMatrix integrate_travel(const SampleMatrix& samples, const Warp& warp, dou
   return UniformSpline(std::move(rate)).cumulative_integral();
 }
 
-SampleMatrix decode_frames(const RegisteredSpace& all_sets, const EncodedSequence& sequence, const Eigen::Vector3d& start,
-                           double rate_hz, int n) {
+SampleMatrix decode_frames(const RegisteredSpace& all_sets, const EncodedSequence& sequence,
+                           const Eigen::Vector3d& start, double rate_hz, int n) {
   const MotionSpace& space = all_sets.of(sequence.cycles);
   SampleMatrix samples = space.samples(sequence.scores, n);
   const int intervals = sequence.last - sequence.first;
@@ -200,7 +200,7 @@ EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip, const Se
                                        .expected = "the same joint names, parents and channels"});
   }
   ClipCurves curves = clip_curves(clip);
-  const std::vector<Run> runs = cut_sequences(clip, sequences);
+  const std::vector<Run> runs = SequenceCutter(clip, sequences).cut(curves, clip.skeleton);
   space.apply_references(curves.values);
   return encode(space, curves, apply_choice(runs, choose_rests(space, curves.values, runs, curves.rate_hz)));
 }

@@ -106,6 +106,7 @@ class LeftOut;
 class ClipDecoder {
  public:
   explicit ClipDecoder(const RegisteredSpace& space);
+  explicit ClipDecoder(RegisteredSpace&&) = delete;
   ~ClipDecoder();
   ClipDecoder(ClipDecoder&&) noexcept;
   ClipDecoder& operator=(ClipDecoder&&) = delete;

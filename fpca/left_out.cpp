@@ -23,9 +23,13 @@ LeftOut::LeftOut(const RegisteredSpace& space) {
 // What is left out at a time of a sequence, added to `out`.
 void LeftOut::add_beside(const EncodedSequence& sequence, double own_time, int level, Eigen::RowVectorXd& out) const {
   const Set& set = sets_[static_cast<std::size_t>(sequence.cycles)];
-  const int kept = set.rows_at[static_cast<std::size_t>(std::min<int>(level, static_cast<int>(set.rows_at.size()) - 1))];
+  const int kept =
+      set.rows_at[static_cast<std::size_t>(std::min<int>(level, static_cast<int>(set.rows_at.size()) - 1))];
   const Eigen::Index rest = sequence.scores.rows() - std::max(kept, ends);
-  if (rest <= 0) return;
+  const auto described = [&](const UniformSpline& functions) {
+    return functions.curves() <= sequence.scores.rows() - ends;
+  };
+  if (rest <= 0 || !std::ranges::all_of(set.functions, described)) return;
   const double x = sequence.warp.space_time(own_time) * (set.points - 1);
   std::vector<Eigen::RowVectorXd> values;
   for (const UniformSpline& functions : set.functions) {

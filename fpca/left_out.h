@@ -17,8 +17,8 @@ class LeftOut {
  public:
   explicit LeftOut(const RegisteredSpace& space);
 
-  // The correction (fpca/cut_join.h) between two neighbours of a run at a level of detail, by curve; 0 for the root's
-  // place, whose slope is the velocity and is kept.
+  // The correction (fpca/cut_join.h) between two neighbours of a run at a level of detail, by curve. 0 for the root's
+  // place: its velocity is kept at the cut, and what functions leave of its travel is spread over the sequence.
   [[nodiscard]] Eigen::RowVectorXd slope(const EncodedSequence& left, const EncodedSequence& right, int level) const;
 
  private:

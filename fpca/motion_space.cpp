@@ -218,7 +218,7 @@ FunctionGroup MotionSpace::fit_pinned(const CurveMoments& moments) const {
   const double may_be_left = (1 - options_.variance_share) * variance;
   FpcaOptions options = fpca_options(options_);
   if (!options.count && may_be_left >= of_functions) options.count = 0;
-  if (!options.count) options.variance_share = 1 - may_be_left / of_functions;
+  if (!options.count) options.variance_share = std::max(1e-12, 1 - may_be_left / of_functions);
   FunctionalPca pca = FunctionalPcaWorkspace(points_, options).fit(above);
   const double left = pca.all_eigenvalues.cwiseMax(0).sum() - pca.eigenvalues.sum();
   return {pca.observed_mean, pca.observed_functions, pca.eigenvalues, variance, left};

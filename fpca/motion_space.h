@@ -44,7 +44,7 @@ enum class Grouping : std::uint8_t {
 
 struct MotionSpaceOptions {
   Grouping grouping = Grouping::all_together;
-  int points = 0;                    // T, 4 .. 1024; 0: longest_s times the highest rate, plus 12, at least 48
+  int points = 0;                    // T, 4 .. 1024; 0: those of the longest sequence and 12
   double variance_share = 0.999999;  // of the curves' variance that the functions cover, in (0, 1] ...
   std::optional<int> functions;      // ... or a count, 1 .. T
   bool smooth = false;  // smooth mean and covariance and take the noise off (PACE); clean motion needs none

@@ -15,8 +15,10 @@ RegisteredSpace::RegisteredSpace(std::vector<MotionSpace> sets) : sets_(std::mov
 }
 
 bool RegisteredSpace::has(int cycles) const {
-  return cycles == 0 || (cycles > 0 && cycles < static_cast<int>(sets_.size()) &&
-                         sets_[static_cast<std::size_t>(cycles)].functions() > 0);
+  if (cycles == 0) return true;
+  if (cycles < 0 || cycles >= static_cast<int>(sets_.size())) return false;
+  const std::vector<CurveMoments>& moments = sets_[static_cast<std::size_t>(cycles)].moments();
+  return !moments.empty() && moments.front().count() > 0;
 }
 
 const MotionSpace& RegisteredSpace::of(int cycles) const {
@@ -26,8 +28,8 @@ const MotionSpace& RegisteredSpace::of(int cycles) const {
 
 int RegisteredSpace::levels() const {
   int most = 0;
-  for (const MotionSpace& set : sets_) {
-    if (set.functions() > 0) most = std::max(most, set.levels());
+  for (std::size_t cycles = 0; cycles < sets_.size(); ++cycles) {
+    if (has(static_cast<int>(cycles))) most = std::max(most, sets_[cycles].levels());
   }
   return most;
 }

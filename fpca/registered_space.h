@@ -20,7 +20,7 @@ class RegisteredSpace {
  public:
   // One set for all sequences, of whatever kind.
   RegisteredSpace(MotionSpace plain);  // NOLINT(google-explicit-constructor): a motion space is one of these
-  // sets[c] is that of sequences of c whole cycles, sets[0] of the others; those without functions are of no use.
+  // sets[c] is that of sequences of c whole cycles, sets[0] of the others; those made of no curves are of no use.
   explicit RegisteredSpace(std::vector<MotionSpace> sets);
 
   // The set of sequences that were cut at rests.

@@ -21,13 +21,12 @@ using Costs = std::array<Cost, levels_compared.size()>;
 // The stretch of a run between two cuts, as one sequence.
 void add_sequence(const MotionSpace& set, const RunSampler& sampler, int first, int last,
                   const Eigen::RowVectorXd& weights, Costs& costs) {
-  const ScoreMatrix scores = set.scores(sampler.sample(first, last, Warp(), set.points()));
-  const Eigen::VectorXd by_row =
-      (scores.cast<double>().array().rowwise() * weights.array()).matrix().rowwise().squaredNorm();
+  const SampleMatrix samples = sampler.sample(first, last, Warp(), set.points());
+  const ScoreMatrix scores = set.scores(samples);
   for (std::size_t i = 0; i < costs.size(); ++i) {
-    const int rows = set.rows_at(levels_compared[i]);
-    costs[i].left += (last - first) * by_row.tail(by_row.size() - rows).sum();
-    costs[i].numbers += rows - (set.options().pinned ? 1 : 0);
+    const SampleMatrix left = (samples - set.samples(scores, levels_compared[i])).array().rowwise() * weights.array();
+    costs[i].left += (last - first) * left.squaredNorm() / static_cast<double>(left.rows());
+    costs[i].numbers += set.rows_at(levels_compared[i]) - (set.options().pinned ? 1 : 0);
   }
 }
 

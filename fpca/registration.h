@@ -4,7 +4,7 @@
 // several of them are worse than those over the second around each rest. So both are tried against the functions of the
 // space, and the one is taken that leaves less at equal cost: at levels of detail 5 and 12
 //
-//   D N^4,     D = sum over the sequences of duration * sum_c w_c^2 sum_{k left out} x_kc^2,    N numbers a curve
+//   D N^4,     D = sum over the sequences of the integral of sum_c w_c^2 (f_c - f_c at that level)^2,    N numbers a curve
 //
 // (twice the numbers leave about a quarter of the error, so a sixteenth of its square); the weights w_c are those of
 // fpca/alignment.h.

@@ -17,7 +17,6 @@ void require_option(bool legal, const char* field, double value, const char* ran
   throw Error(ErrorKind::usage, {.found = fmt::format("SequenceOptions::{} = {}", field, value), .expected = range});
 }
 
-
 using Movement = SequenceCutter::Movement;
 
 // Steps between consecutive frames (cm, by joint), five at a time, so that a long clip needs no table of positions.
@@ -184,7 +183,6 @@ Run cut_run(const Movement& movement, const std::vector<CyclicStretch>& stretche
   if (last > run.cuts.back()) cut_at_rests(movement, run.cuts.back(), last, rate_hz, options, run);
   return options.equal_windows ? equal_windows(run) : run;
 }
-
 
 }  // namespace
 

@@ -25,8 +25,9 @@
 namespace kinespace {
 
 struct SequenceOptions {
-  int most_cycles = 3;       // of a sequence, 0 .. 8; 0: all motion is cut at rests
-  bool equal_windows = false;  // as many sequences, but of equal length, at any phase: what registration is held against
+  int most_cycles = 3;  // of a sequence, 0 .. 8; 0: all motion is cut at rests
+  bool equal_windows =
+      false;                 // as many sequences, but of equal length, at any phase: what registration is held against
   double shortest_s = 0.8;   // > 0; a sequence of n frames lasts n / rate
   double longest_s = 1.2;    // > shortest_s
   double length_weight = 5;  // >= 0; how much a sequence of the longest length costs against a cut amid motion

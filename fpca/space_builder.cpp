@@ -18,9 +18,9 @@
 namespace kinespace {
 namespace {
 
-constexpr int clips_per_sum = 16;  // fixed, so that sums do not depend on threads
-// As many sequences of a clip are in memory together: a quarter of an hour.
-constexpr std::size_t sequences_per_block = 1024;
+constexpr int clips_per_sum = 16;                                // fixed, so that sums do not depend on threads
+constexpr std::size_t sequences_per_block = 1024;                // whose features are in memory together
+constexpr std::size_t bytes_of_samples = std::size_t{32} << 20;  // of a clip that wait to be multiplied
 
 // Loads every clip once, block by block and the clips of a block in parallel, and hands each to `work` (in parallel)
 // and then to `gather` (one at a time, in order). The clip is the work's own, to change.
@@ -107,22 +107,26 @@ SetMoments empty_moments(const RegisteredSpace& space) {
 
 void merge_into(SetMoments& all, const SetMoments& part) {
   for (std::size_t set = 0; set < all.size(); ++set) {
-    for (std::size_t g = 0; g < all[set].size(); ++g) all[set][g].merge(part[set][g]);
+    for (std::size_t g = 0; g < part[set].size(); ++g) all[set][g].merge(part[set][g]);
   }
 }
 
 SetMoments moments_of(const RegisteredSpace& space, PreparedClip& clip, const std::vector<Warp>& warps,
                       const Compute& compute) {
-  SetMoments part = empty_moments(space);
+  SetMoments part(space.sets().size());
   BySet<std::vector<SampleMatrix>> samples(part.size());
-  visit_samples(space, clip, warps, [&](std::size_t set, SampleMatrix&& of_sequence) {
-    samples[set].push_back(std::move(of_sequence));
-    if (samples[set].size() < sequences_per_block) return;
+  const auto add = [&](std::size_t set) {
+    if (part[set].empty()) part[set] = space.sets()[set].empty_moments();
     space.sets()[set].accumulate(samples[set], part[set], compute);
     samples[set].clear();
+  };
+  visit_samples(space, clip, warps, [&](std::size_t set, SampleMatrix&& of_sequence) {
+    const auto size = static_cast<std::size_t>(of_sequence.size()) * sizeof(double);
+    samples[set].push_back(std::move(of_sequence));
+    if (samples[set].size() * size >= bytes_of_samples) add(set);
   });
   for (std::size_t set = 0; set < part.size(); ++set) {
-    if (!samples[set].empty()) space.sets()[set].accumulate(samples[set], part[set], compute);
+    if (!samples[set].empty()) add(set);
   }
   return part;
 }
@@ -372,6 +376,11 @@ void SpaceBuildOptions::validate() const {
 
 namespace {
 
+// Smoothing does not leave functions at 0 at the ends.
+bool pinned(const MotionSpaceOptions& options) {
+  return options.pinned && !options.smooth;
+}
+
 // The first set that there are sequences for.
 std::size_t first_set(const Survey& found) {
   const auto first = std::ranges::find_if(found.longest, [](int longest) { return longest > 0; });
@@ -379,17 +388,18 @@ std::size_t first_set(const Survey& found) {
 }
 
 // Sets without functions: one for each kind of sequence that there is, and that of sequences cut at rests.
-RegisteredSpace empty_space(const Survey& found, const MotionSpaceOptions& options, const Eigen::Matrix4Xd& references) {
+RegisteredSpace empty_space(const Survey& found, const MotionSpaceOptions& options,
+                            const Eigen::Matrix4Xd& references) {
   std::vector<MotionSpace> sets;
   for (std::size_t set = 0; set < found.longest.size(); ++set) {
     MotionSpaceOptions of_set = options;
     of_set.cycles = static_cast<int>(set);
     of_set.pace = found.pace(set);
+    of_set.pinned = pinned(options);
     // A set that nothing was cut for is made of what there is (fit_sets).
     const std::size_t made_of = set == 0 ? first_set(found) : set;
-    const int points = options.points != 0
-                           ? options.points
-                           : automatic_points(found.longest[made_of], static_cast<int>(made_of));
+    const int points =
+        options.points != 0 ? options.points : automatic_points(found.longest[made_of], static_cast<int>(made_of));
     sets.emplace_back(found.skeleton, of_set, points).set_references(references);
   }
   return RegisteredSpace(std::move(sets));
@@ -401,7 +411,9 @@ RegisteredSpace fit_sets(const RegisteredSpace& space, SetMoments moments) {
   std::vector<MotionSpace> sets = space.sets();
   for (std::size_t set = 1; set < sets.size(); ++set) sets[set].fit(std::move(moments[set]));
   if (moments[0][0].count() == 0) {
-    const auto first = std::ranges::find_if(sets, [](const MotionSpace& set) { return set.functions() > 0; });
+    const auto first = std::find_if(sets.begin() + 1, sets.end(), [](const MotionSpace& set) {
+      return !set.moments().empty() && set.moments().front().count() > 0;
+    });
     if (first != sets.end() && first->points() == sets[0].points()) moments[0] = first->moments();
   }
   sets[0].fit(std::move(moments[0]));
@@ -413,7 +425,7 @@ RegisteredSpace fit_sets(const RegisteredSpace& space, SetMoments moments) {
 MotionSpace fit_pooled(const PreparedSource& clips, const RegisteredSpace& space,
                        const std::vector<std::vector<Warp>>& warps, const SpaceBuildOptions& options,
                        const Compute& compute, const Progress& progress) {
-  MotionSpaceOptions pooled_options{.functions = 2 * options.alignment.functions, .pinned = options.space.pinned};
+  MotionSpaceOptions pooled_options{.functions = 2 * options.alignment.functions, .pinned = pinned(options.space)};
   MotionSpace pooled(space.skeleton(), pooled_options, space.plain().points());
   pooled.set_references(space.references());
   pooled.fit(std::move(gather_moments(clips, pooled, warps, compute, progress, "analyse").front()));
@@ -536,8 +548,7 @@ std::vector<RestChoice> choose_all(const PreparedSource& clips, const Registered
 std::vector<RestChoice> choose_all(const PreparedSource& clips, const Survey& found, const SpaceBuildOptions& options,
                                    const Compute& compute, const Progress& progress) {
   if (found.stretches == 0) return std::vector<RestChoice>(static_cast<std::size_t>(clips.count));
-  const PreparedSource both =
-      with_runs(clips, [](int, const std::vector<Run>& runs) { return both_ways(runs); });
+  const PreparedSource both = with_runs(clips, [](int, const std::vector<Run>& runs) { return both_ways(runs); });
   const RegisteredSpace empty = empty_space(survey(both, progress), options.space, found.orientations.references());
   RegisteredSpace space = fit_sets(empty, gather_moments(both, empty, {}, compute, progress, "register"));
   std::vector<RestChoice> choices = choose_all(clips, space, progress);
@@ -548,7 +559,7 @@ std::vector<RestChoice> choose_all(const PreparedSource& clips, const Survey& fo
   bool dropped = false;
   for (std::size_t set = 1; set < sets.size(); ++set) {
     const int held = set < chosen.sequences.size() ? chosen.sequences[set] : 0;
-    if (sets[set].functions() == 0 || held >= least_share * all) continue;
+    if (!space.has(static_cast<int>(set)) || held >= least_share * all) continue;
     sets[set] = empty.sets()[set];
     dropped = true;
   }
@@ -567,8 +578,8 @@ BuiltSpace build_space(const PreparedSource& all_clips, const SpaceBuildOptions&
   if (found.stretches > 0) found = survey(clips, progress);
   RegisteredSpace space = empty_space(found, options.space, found.orientations.references());
   std::vector<std::vector<Warp>> warps;
-  const bool warped = options.align && options.alignment.rounds > 0 &&
-                      alignment_pays(clips, found, space, options, compute, progress);
+  const bool warped =
+      options.align && options.alignment.rounds > 0 && alignment_pays(clips, found, space, options, compute, progress);
   if (warped) warps = align_all(clips, space, options, compute, progress);
   space = fit_sets(space, gather_moments(clips, space, warps, compute, progress, "analyse"));
   space.set_warped(warped);

@@ -42,7 +42,7 @@ struct PreparedSource {
 [[nodiscard]] PreparedSource source_of(const std::vector<PreparedClip>& clips);
 
 struct SpaceBuildOptions {
-  MotionSpaceOptions space{.pinned = true};  // `cycles` is each set's own
+  MotionSpaceOptions space{.pinned = true};  // `cycles` and `pace` are each set's own; what is smoothed is not pinned
   SequenceOptions sequences;
   AlignmentOptions alignment;
   bool align = true;

@@ -163,7 +163,6 @@ MeasuredError measure_error(const PreparedClip& clip, const ClipDecoder& decoder
 }
 
 void count_cycles(const EncodedClip& clip, LibraryReport& report) {
-  report.seconds += clip.frames / clip.rate_hz;
   for (const EncodedRun& run : clip.runs) {
     for (const EncodedSequence& s : run.sequences) {
       if (s.cycles == 0) continue;
@@ -177,7 +176,7 @@ void count_cycles(const EncodedClip& clip, LibraryReport& report) {
 std::vector<int> measured_levels(int all) {
   std::vector<int> out;
   for (int level = 1; level < all; level = level < 6 ? level + 1 : level + level / 4) out.push_back(level);
-  out.push_back(std::max(1, all));
+  if (all > 0) out.push_back(all);
   return out;
 }
 
@@ -229,7 +228,8 @@ class SpaceWriter {
     for (const int level : measured_levels(built_.space.levels())) {
       out.clip.levels.push_back({level, measure_error(prepared, decoder_, out.clip, level)});
     }
-    out.clip.error = out.clip.levels.back().error;
+    out.clip.error =
+        out.clip.levels.empty() ? measure_error(prepared, decoder_, out.clip, -1) : out.clip.levels.back().error;
     out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
     return out;
@@ -288,6 +288,11 @@ void transfer_clips(Library& library, std::int64_t space_id, const RegisteredSpa
     clip.error.max_joint_error_cm += moved.max_joint_error_cm;
     clip.levels.clear();
     const std::vector<float> old_vector = library.retrieval_vector(row.id);
+    if (old_vector.size() != clips_from.dimensions()) {
+      throw Error(ErrorKind::bad_input, {.file = row.name,
+                                         .found = fmt::format("a vector of {} numbers", old_vector.size()),
+                                         .expected = fmt::format("{}", clips_from.dimensions())});
+    }
     const Eigen::Map<const ScoreMatrix> old_scores(old_vector.data(), clips_from.space().functions(),
                                                    clips_from.space().curves());
     const ScoreMatrix scores = clips_to.space().transfer(old_scores, clips_from.space());

@@ -40,7 +40,7 @@ struct LibraryReport {
   double seconds = 0;         // of the library
   std::int64_t cycles = 0;    // whole ones in it ...
   double cyclic_seconds = 0;  // ... and how long they last together
-  bool warped = false;      // whether warps of motion that was cut at rests won on held-out clips
+  bool warped = false;        // whether warps of motion that was cut at rests won on held-out clips
   std::int64_t bytes = 0;
   std::vector<std::string> doubts;  // what looks wrong in clips (motion/plausibility.h), a line a kind
 };

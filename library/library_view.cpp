@@ -136,7 +136,7 @@ std::vector<LevelError> LibraryView::level_errors(const ClipRow& row) {
 }
 
 ClipCurves LibraryView::curves(const ClipRow& row, int functions) {
-  return decode(space(row.space_id), encoded(row, functions), functions);
+  return decode(space(row.space_id), encoded(row), functions);
 }
 
 Clip LibraryView::clip(const ClipRow& row, int functions) {

@@ -40,7 +40,8 @@ SampleMatrix mean_and_functions(const MotionSpace& space, int count) {
   Eigen::MatrixXd functions = group->functions;
   Eigen::VectorXd mean = group->mean;
   if (!as_they_are) {
-    FunctionalPca pca = FunctionalPcaWorkspace(space.points(), {.count = count}).fit(moments);
+    FunctionalPca pca =
+        FunctionalPcaWorkspace(space.points(), {.variance_share = space.options().variance_share}).fit(moments);
     functions = std::move(pca.observed_functions);
     mean = std::move(pca.observed_mean);
   }

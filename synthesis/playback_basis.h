@@ -35,13 +35,13 @@ class PlaybackBasis {
   // How slopes are corrected at cuts where the ends of sequences are kept; null where they are not.
   [[nodiscard]] const LeftOut* left_out() const { return left_out_ ? &*left_out_ : nullptr; }
   // Whether sequences of so many cycles can be played, and how: `set` below is that number.
-  [[nodiscard]] bool has(int set) const { return set >= 0 && set < static_cast<int>(sets_.size()) && of(set).points > 0; }
+  [[nodiscard]] bool has(int set) const {
+    return set >= 0 && set < static_cast<int>(sets_.size()) && of(set).points > 0;
+  }
   [[nodiscard]] int points(int set) const { return of(set).points; }
   // Entries behind the mean: in all, and at a level of detail.
   [[nodiscard]] int rows(int set) const { return of(set).rows; }
-  [[nodiscard]] int rows_at(int set, int level) const {
-    return of(set).rows_at[static_cast<std::size_t>(level)];
-  }
+  [[nodiscard]] int rows_at(int set, int level) const { return of(set).rows_at[static_cast<std::size_t>(level)]; }
   [[nodiscard]] int curves() const { return static_cast<int>(group_of_.size()); }
   [[nodiscard]] int group_of(int curve) const { return group_of_[static_cast<std::size_t>(curve)]; }
   // Whether the same components of all joints share functions, as they do in the two coarser groupings.

@@ -350,7 +350,8 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
     for (int k = 0; k <= rows; ++k) {
       float weight = 0;
       for (int j = 0; j < PlayerParts::warp_terms(sequence); ++j) {
-        const float integral = cubic(basis.integrals(sequence.set, axis, k / lanes, place.cell) + 4 * j * lanes + k % lanes);
+        const float integral =
+            cubic(basis.integrals(sequence.set, axis, k / lanes, place.cell) + 4 * j * lanes + k % lanes);
         weight += sequence.warp[static_cast<std::size_t>(j)] * sequence.duration_s *
                   (integral - own * basis.ends(sequence.set, axis, k / lanes)[j * lanes + k % lanes]);
       }
@@ -493,7 +494,7 @@ class GrowingSequence {
 
   const PlayerParts& parts_;
   const PlayerParts::Sequence& sequence_;
-  int entries_ = 0;  // that were added behind the mean
+  int entries_ = 0;               // that were added behind the mean
   std::vector<Weights> weights_;  // by curve; empty where shared with an earlier one
   SampleMatrix frames_;
 };

@@ -22,8 +22,8 @@ struct SampledStretch {
   WindowSamples samples;
 };
 
-void sample_clip(const RegisteredSpace& space, const EncodedClip& encoded, std::size_t clip, const WindowOptions& options,
-                 std::vector<SampledStretch>& out) {
+void sample_clip(const RegisteredSpace& space, const EncodedClip& encoded, std::size_t clip,
+                 const WindowOptions& options, std::vector<SampledStretch>& out) {
   const ClipCurves curves = decode(space, encoded);
   for (const EncodedRun& run : encoded.runs) {
     const int first = run.sequences.front().first;

@@ -90,6 +90,8 @@ std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> by
   FunctionGroup group;
   group.variance = in.get<double>();
   if (pinned) group.left = in.get<double>();
+  if (!std::isfinite(group.variance) || !std::isfinite(group.left))
+    in.fail("a variance that is no number", "a finite one");
   group.mean = get_matrix(in, points, 1);
   group.eigenvalues = get_matrix(in, k, 1);
   group.functions = get_matrix(in, points, k);
@@ -389,10 +391,15 @@ RegisteredSpace unpack_registered_space(std::span<const std::byte> bytes, const 
   }
   stream.require_kind("registered-space");
   std::vector<MotionSpace> sets{unpack_space(stream.section(set_name(0)), source)};
+  if (sets.front().options().cycles != 0) {
+    throw Error(ErrorKind::bad_input,
+                {.file = source, .found = "no set for motion cut at rests", .expected = "that set first"});
+  }
   for (std::size_t cycles = 1; cycles <= 8; ++cycles) {
     if (!stream.has_section(set_name(cycles))) continue;
     MotionSpace set = unpack_space(stream.section(set_name(cycles)), source);
-    const bool alike = set.skeleton().same_tree(sets.front().skeleton()) && set.options().cycles == static_cast<int>(cycles) &&
+    const bool alike = set.skeleton().same_tree(sets.front().skeleton()) &&
+                       set.options().cycles == static_cast<int>(cycles) &&
                        set.options().grouping == sets.front().options().grouping &&
                        set.options().pinned == sets.front().options().pinned;
     if (!alike) {
@@ -436,7 +443,8 @@ std::vector<LevelError> unpack_levels(ByteReader in, int levels) {
     before = l.level = static_cast<int>(level);
     l.error.mean_joint_error_cm = static_cast<double>(in.get<float>());
     l.error.max_joint_error_cm = static_cast<double>(in.get<float>());
-    if (!(l.error.mean_joint_error_cm >= 0) || !std::isfinite(l.error.max_joint_error_cm)) {
+    const bool sound = l.error.mean_joint_error_cm >= 0 && l.error.max_joint_error_cm >= l.error.mean_joint_error_cm;
+    if (!sound || !std::isfinite(l.error.max_joint_error_cm)) {
       in.fail("an error that is no distance", "cm");
     }
   }
