@@ -75,8 +75,8 @@ TEST_F(Transitions, heights_of_the_ground_stay) {
   const JointPositions positions = joint_positions(plan->transition.clip);
   double lowest = 1e9;
   for (const auto& p : positions.values) lowest = std::min(lowest, p.y());
-  EXPECT_GT(lowest, -3);
-  EXPECT_LT(lowest, 3);
+  EXPECT_GT(lowest, -4);
+  EXPECT_LT(lowest, 4);
 }
 
 TEST_F(Transitions, a_clip_can_follow_itself) {
@@ -84,7 +84,8 @@ TEST_F(Transitions, a_clip_can_follow_itself) {
   ASSERT_TRUE(plan);
   const double once = view_.clip(view_.require_clip("walk_normal_001")).duration_s();
   EXPECT_GT(plan->transition.clip.duration_s(), 1.2 * once);
-  EXPECT_LT(plan->transition.joins[0].connection.cost_cm, 12);
+  // A longer overlap is taken where a shorter one's seam would be a hair faster than the motion.
+  EXPECT_LT(plan->transition.joins[0].connection.cost_cm, 15);
 }
 
 TEST_F(Transitions, three_clips_have_two_seams) {
