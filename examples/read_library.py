@@ -146,7 +146,7 @@ def main(path, wanted=None):
         for cycles, of in spaces[number].items():
             print("  cycles", cycles)
             print("    functions", max(len(group[3]) for group in of.groups))
-            print(f"    variance {1 - sum(group[1] for group in of.groups) / sum(group[0] for group in of.groups):.9f}")
+            print(f"    variance {1 - sum(group[1] for group in of.groups) / (sum(group[0] for group in of.groups) or 1):.9f}")
             for group in of.groups:
                 print("    shares", *[f"{value / group[0]:.6f}" for value in group[3]])
 
