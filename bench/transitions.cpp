@@ -49,7 +49,7 @@ std::vector<std::pair<std::size_t, std::size_t>> random_pairs(std::size_t clips,
 }
 
 void connection_rows(const std::string& data, LibraryView& view, BenchReport& report) {
-  const MotionSpace& motions = view.space(view.library().spaces().front().id).plain();
+  const RegisteredSpace& motions = view.space(view.library().spaces().front().id);
   const ConnectionSpace space(motions);
   const Ends ends = ends_of(view, space);
   const auto pairs = random_pairs(ends.rows.size(), 200);
@@ -121,7 +121,7 @@ double median_of(std::vector<double> values) {
 
 void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) {
   const std::int64_t space_id = view.library().spaces().front().id;
-  const ConnectionSpace space(view.space(space_id).plain());
+  const ConnectionSpace space(view.space(space_id));
   std::vector<ClipRow> rows;
   for (const ClipRow& row : view.library().clips()) {
     if (space.long_enough(static_cast<double>(row.frames - 1) / row.rate_hz)) rows.push_back(row);

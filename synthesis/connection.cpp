@@ -32,36 +32,65 @@ constexpr int minima_refined = 5;
 constexpr double worth_refining = 2;  // cells that cost so many times the best are left
 constexpr int refinements = 6;
 constexpr int most_functions = 64;
+
+// From the points of a set to those of the `number`-th of `stretches` equal stretches of its time, by straight lines.
+Eigen::MatrixXd cut_out(Eigen::Index from, Eigen::Index to, int number, int stretches) {
+  Eigen::MatrixXd out = Eigen::MatrixXd::Zero(to, from);
+  for (Eigen::Index i = 0; i < to; ++i) {
+    const double s = (number + static_cast<double>(i) / static_cast<double>(to - 1)) / stretches;
+    const double x = s * static_cast<double>(from - 1);
+    const auto cell = std::min(static_cast<Eigen::Index>(x), from - 2);
+    out(i, cell) = 1 - (x - static_cast<double>(cell));
+    out(i, cell + 1) = x - static_cast<double>(cell);
+  }
+  return out;
+}
+
+// Moments of all motion of a space by the second or so: sequences that last longer count as several.
+CurveMoments moments_by_second(const RegisteredSpace& space, std::size_t group) {
+  CurveMoments all(space.plain().points());
+  for (const MotionSpace& set : space.sets()) {
+    if (!space.has(set.options().cycles) || set.moments()[group].count() == 0) continue;
+    const CurveMoments& moments = set.moments()[group];
+    const int stretches = static_cast<int>(std::lround(set.options().pace));
+    for (int i = 0; i < stretches; ++i) {
+      const Eigen::MatrixXd part = cut_out(set.points(), space.plain().points(), i, stretches);
+      all.merge({moments.count(), part * moments.mean(), part * moments.scatter() * part.transpose()});
+    }
+  }
+  return all;
+}
+
 // Mean and functions of the curves as they are: those of a pinned space vanish at the ends, and windows do not.
-SampleMatrix mean_and_functions(const MotionSpace& space, int count) {
-  const auto group = std::ranges::max_element(space.groups(), {}, &FunctionGroup::variance);
-  const CurveMoments& moments = space.moments()[static_cast<std::size_t>(group - space.groups().begin())];
-  const bool as_they_are = !space.options().pinned || moments.count() == 0;
+SampleMatrix mean_and_functions(const RegisteredSpace& space, int count) {
+  const auto& groups = space.plain().groups();
+  const auto group = std::ranges::max_element(groups, {}, &FunctionGroup::variance);
   Eigen::MatrixXd functions = group->functions;
   Eigen::VectorXd mean = group->mean;
-  if (!as_they_are) {
-    FunctionalPca pca =
-        FunctionalPcaWorkspace(space.points(), {.variance_share = space.options().variance_share}).fit(moments);
+  if (space.options().pinned) {
+    const CurveMoments moments = moments_by_second(space, static_cast<std::size_t>(group - groups.begin()));
+    const FpcaOptions options{.variance_share = space.options().variance_share};
+    FunctionalPca pca = FunctionalPcaWorkspace(moments.points(), options).fit(moments);
     functions = std::move(pca.observed_functions);
     mean = std::move(pca.observed_mean);
   }
   const auto kept = std::min<Eigen::Index>(count, functions.cols());
-  SampleMatrix out(space.points(), kept + 1);
+  SampleMatrix out(mean.size(), kept + 1);
   out << mean, functions.leftCols(kept);
   return out;
 }
 
 // What motions can be scored in: an orthonormal basis (trapezoid rule) of the span of 1, the mean and the functions.
-SampleMatrix orthonormal_functions(const MotionSpace& space, int count) {
+SampleMatrix orthonormal_functions(const RegisteredSpace& space, int count) {
   const SampleMatrix found = mean_and_functions(space, count - 2);
   const Eigen::Index wanted = found.cols() + 1;
-  SampleMatrix columns(space.points(), wanted);
+  SampleMatrix columns(found.rows(), wanted);
   columns.col(0).setOnes();
   columns.rightCols(wanted - 1) = found;
   const UniformSpline spline(std::move(columns));
   SampleMatrix at(function_points, wanted);
   for (int i = 0; i < function_points; ++i) {
-    spline.value(i * static_cast<double>(space.points() - 1) / (function_points - 1), at.row(i));
+    spline.value(i * static_cast<double>(found.rows() - 1) / (function_points - 1), at.row(i));
   }
   const Eigen::VectorXd root = trapezoid_weights(function_points, 1.0).cwiseSqrt();
   const Eigen::MatrixXd scaled = root.asDiagonal() * at;
@@ -101,7 +130,7 @@ Eigen::RowVectorXd invariant_weights(const Skeleton& skeleton) {
   return out;
 }
 
-Eigen::RowVectorXd invariant_reference(const MotionSpace& space) {
+Eigen::RowVectorXd invariant_reference(const RegisteredSpace& space) {
   Eigen::RowVectorXd out = Eigen::RowVectorXd::Zero(InvariantPose::size(space.curves()));
   out(InvariantPose::rotations) = 1;
   for (Eigen::Index j = 1; j < space.references().cols(); ++j) {
@@ -150,10 +179,10 @@ struct ConnectionSpace::Forms {
   [[nodiscard]] Eigen::MatrixXf cross(float speed) const { return speed * cross_rates + cross_rest; }
 };
 
-ConnectionSpace::ConnectionSpace(const MotionSpace& space, const ConnectionOptions& options)
+ConnectionSpace::ConnectionSpace(const RegisteredSpace& space, const ConnectionOptions& options)
     : ConnectionSpace(space, orthonormal_functions(space, options.functions), options) {}
 
-ConnectionSpace::ConnectionSpace(const MotionSpace& space, SampleMatrix functions, const ConnectionOptions& options)
+ConnectionSpace::ConnectionSpace(const RegisteredSpace& space, SampleMatrix functions, const ConnectionOptions& options)
     : options_(options),
       weights_(invariant_weights(space.skeleton())),
       reference_(invariant_reference(space)),

@@ -30,7 +30,7 @@
 
 #include <Eigen/Core>
 
-#include "kinespace/fpca/motion_space.h"
+#include "kinespace/fpca/registered_space.h"
 #include "kinespace/synthesis/curve_sampler.h"
 
 namespace kinespace {
@@ -67,9 +67,9 @@ struct Connection {
 
 class ConnectionSpace {
  public:
-  ConnectionSpace(const MotionSpace& space, const ConnectionOptions& options = {});
+  ConnectionSpace(const RegisteredSpace& space, const ConnectionOptions& options = {});
   // With functions that were kept (as functions() gives them) from an earlier state of the space.
-  ConnectionSpace(const MotionSpace& space, SampleMatrix functions, const ConnectionOptions& options);
+  ConnectionSpace(const RegisteredSpace& space, SampleMatrix functions, const ConnectionOptions& options);
 
   // Of clips whose curves are on the space's side (MotionSpace::apply_references). Throws Error{usage} when half of the
   // clip is shorter than the smallest overlap.

@@ -115,7 +115,7 @@ void MotionGraphOptions::validate() const {
 MotionGraph MotionGraph::make(LibraryView& library, std::int64_t space_id, const MotionGraphOptions& options,
                               const Progress& progress) {
   options.validate();
-  const MotionSpace& space = library.space(space_id).plain();
+  const RegisteredSpace& space = library.space(space_id);
   MotionGraph graph;
   graph.options_ = options;
   graph.key_ = space.skeleton().tree_hash();
@@ -159,7 +159,7 @@ void MotionGraph::take_in(LibraryView& library, std::int64_t space_id, const Pro
   const std::set<std::int64_t> had(clips_.begin(), clips_.end());
   std::vector<ClipRow> rows;
   bool any = false;
-  const ConnectionSpace space(library.space(space_id).plain(), functions_, options_.connection);
+  const ConnectionSpace space(library.space(space_id), functions_, options_.connection);
   for (const ClipRow& row : library.library().clips()) {
     if (row.space_id != space_id || !space.long_enough(static_cast<double>(row.frames - 1) / row.rate_hz)) continue;
     any = any || !had.contains(row.id);

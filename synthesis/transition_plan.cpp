@@ -56,7 +56,7 @@ std::optional<GraphPath> way_through(LibraryView& library, const std::vector<Cli
 
 // Clips that lead from neighbour to neighbour as one motion: each alone at first and at last, so that it is entered and
 // left as the first and the last clip are.
-ClipCurves neighbours_as_one(const MotionSpace& space, std::span<const ClipCurves> clips, const Skeleton& skeleton) {
+ClipCurves neighbours_as_one(const RegisteredSpace& space, std::span<const ClipCurves> clips, const Skeleton& skeleton) {
   constexpr double alone = 0.3;
   const BezierWeights weights = BezierWeights::through_motions(
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(clips.size()), 1), static_cast<int>(clips.size()));
@@ -86,7 +86,7 @@ std::optional<PlannedTransition> plan_transition(LibraryView& library, std::span
   }
   const std::vector<ClipRow> rows = clips_of_one_tree(library, clips);
   for (const ClipRow& row : rows) require_length(library, row, options.graph.connection.shortest_s);
-  const MotionSpace& motions = library.space(rows.front().space_id).plain();
+  const RegisteredSpace& motions = library.space(rows.front().space_id);
   const Skeleton& skeleton = library.skeleton(rows.front().skeleton_id);
   const ConnectionSpace space(motions, options.graph.connection);
 

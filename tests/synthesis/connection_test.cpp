@@ -19,7 +19,7 @@ class Connections : public ::testing::Test {
     folder_ = std::make_unique<test::LibraryFolder>();
     static_cast<void>(folder_->build());
     view_ = std::make_unique<LibraryView>(folder_->library());
-    space_ = std::make_unique<ConnectionSpace>(view_->space(view_->library().spaces().front().id).plain());
+    space_ = std::make_unique<ConnectionSpace>(view_->space(view_->library().spaces().front().id));
     for (const ClipRow& row : view_->library().clips()) {
       const ClipCurves curves = view_->curves(row);
       ends_.push_back(space_->end_of(curves));

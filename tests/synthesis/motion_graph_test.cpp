@@ -23,7 +23,7 @@ TEST_F(Graph, the_best_ways_are_those_of_brute_force) {
   LibraryView view(folder_.library());
   const std::int64_t space_id = view.library().spaces().front().id;
   const MotionGraph graph = MotionGraph::make(view, space_id, {});
-  const ConnectionSpace space(view.space(space_id).plain(), graph.functions(), graph.options().connection);
+  const ConnectionSpace space(view.space(space_id), graph.functions(), graph.options().connection);
   std::map<std::int64_t, ConnectionMotion> ends, starts;
   for (const std::int64_t id : graph.clips()) {
     const ClipCurves curves = view.curves(view.library().clip(id));
