@@ -25,7 +25,7 @@ namespace kinespace {
 
 struct TransitionOptions {
   double largest_ratio = 1.01;  // > 0; a seam this smooth is not made longer for more
-  bool fixed = false;        // take the best connection of eq. 15 whatever its seam
+  bool fixed = false;           // take the best connection of eq. 15 whatever its seam
 
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;

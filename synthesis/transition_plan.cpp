@@ -56,7 +56,8 @@ std::optional<GraphPath> way_through(LibraryView& library, const std::vector<Cli
 
 // Clips that lead from neighbour to neighbour as one motion: each alone at first and at last, so that it is entered and
 // left as the first and the last clip are.
-ClipCurves neighbours_as_one(const RegisteredSpace& space, std::span<const ClipCurves> clips, const Skeleton& skeleton) {
+ClipCurves neighbours_as_one(const RegisteredSpace& space, std::span<const ClipCurves> clips,
+                             const Skeleton& skeleton) {
   constexpr double alone = 0.3;
   const BezierWeights weights = BezierWeights::through_motions(
       Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(clips.size()), 1), static_cast<int>(clips.size()));
