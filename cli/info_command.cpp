@@ -18,6 +18,7 @@
 #include "kinespace/base/file.h"
 #include "kinespace/base/printable.h"
 #include "kinespace/codecs/registry.h"
+#include "kinespace/fpca/registration_picture.h"
 #include "kinespace/library/library_view.h"
 #include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/plausibility.h"
@@ -36,15 +37,23 @@ struct InfoOptions {
   std::vector<std::filesystem::path> files;  // all that were named; several only to be compared with each other
   bool repeats = false;
   std::optional<std::filesystem::path> picture;
+  std::string pictured_clip;  // of a library; empty: the one with the most whole cycles
 };
 struct Describer {
   bool (*claims)(const std::filesystem::path& file);
   Json (*describe)(const InfoOptions& options, Session& session);
 };
 
+void draw_clip(const Clip& clip, const std::filesystem::path& picture) {
+  const ClipCurves curves = clip_curves(clip);
+  const std::vector<Run> runs = SequenceCutter(clip, {}).cut(curves, clip.skeleton);
+  write_file_atomically(picture, registration_picture_svg(curves, clip.skeleton, pictured(runs)));
+}
+
 Json describe_clip(const InfoOptions& options, Session& session) {
   const Clip clip = read_clip(options.file);
   session.note_doubts(clip);
+  if (options.picture) draw_clip(clip, *options.picture);
   const double height = clip.skeleton.rest_height();
   return {{"kind", "clip"},
           {"name", clip.name},
@@ -133,8 +142,33 @@ class LevelTable {
   std::map<int, Sum> levels_;
 };
 
+int whole_cycles(const EncodedClip& clip) {
+  int cycles = 0;
+  for (const PicturedSequence& s : pictured(clip)) cycles += s.cycles;
+  return cycles;
+}
+
+ClipRow most_cyclic(LibraryView& view) {
+  std::optional<ClipRow> out;
+  int most = -1;
+  for (const ClipRow& row : view.library().clips()) {
+    const int cycles = whole_cycles(view.encoded(row, 1));
+    if (cycles > most) out = row;
+    most = std::max(most, cycles);
+  }
+  if (!out) throw Error(ErrorKind::usage, {.found = "a library without clips", .expected = "one to draw"});
+  return *out;
+}
+
+void draw_library_clip(LibraryView& view, const InfoOptions& options) {
+  const ClipRow row = options.pictured_clip.empty() ? most_cyclic(view) : view.require_clip(options.pictured_clip);
+  write_file_atomically(*options.picture, registration_picture_svg(view.curves(row), view.skeleton(row.skeleton_id),
+                                                                   pictured(view.encoded(row, 1))));
+}
+
 Json describe_library(const InfoOptions& options, Session& /*session*/) {
   LibraryView view(options.file);
+  if (options.picture) draw_library_clip(view, options);
   const Library& library = view.library();
   const LibraryTotals totals = library.totals();
   Json clips = Json::array();
@@ -194,6 +228,11 @@ bool is_stream(const std::filesystem::path& file) {
 }
 
 Json describe_stream(const InfoOptions& options, Session& /*session*/) {
+  if (options.picture) {
+    throw Error(ErrorKind::usage, {.found = "--picture of a stream",
+                                   .expected = "a clip or a library",
+                                   .remedy = "decode it first"});
+  }
   const StreamFile file(options.file, options.basis);
   const StreamReader* reader = &file.reader();
   const Bitstream& stream = reader->stream();
@@ -312,8 +351,14 @@ void add_info(CLI::App& app, Session& session) {
   command->add_flag("--json", options->json, "Print it as one JSON object");
   CLI::Option* repeats = command->add_flag(
       "--repeats", options->repeats, "Which stretches of the clips repeat others (repeated motion analysis, lin2011)");
-  command->add_option("--picture", options->picture, "With --repeats: an SVG of the self-distance table to write")
-      ->needs(repeats);
+  CLI::Option* picture =
+      command->add_option("--picture", options->picture,
+                          "An SVG of the cycles of a clip, and its curves before and after registration; with --repeats "
+                          "of the self-distance table");
+  command
+      ->add_option("--clip", options->pictured_clip, "The clip of a library to draw, not the one with the most cycles")
+      ->needs(picture)
+      ->excludes(repeats);
   session.files.reads(command, {"FILE", "--basis"});
   session.files.writes(command, {"--picture"}, FileKind::svg);
   command->callback([options, &session] { run_info(*options, session); });

@@ -83,7 +83,7 @@ def space(blob):
 
 
 def sequences(blob):
-    """Of each run of a clip the sequences: first frame, last frame, whole cycles, and the five coefficients of the warp."""
+    """Of each run of a clip the sequences: first and last frame, whole cycles, extra detail, the warp's five coefficients."""
     options, sections = stream(blob)
     part, runs = Bytes(sections["sequences"]), []
     for _ in range(part.varint()):
@@ -91,10 +91,16 @@ def sequences(blob):
         for _ in range(count):
             last = first + part.varint()
             cycles = part.take(1)[0] if "kinds" in options else 0
-            run.append((first, last, cycles, [a / 64 for a in part.numbers("b", 5)]))
+            extra = part.take(1)[0] if "extra_detail" in options else 0
+            run.append((first, last, cycles, extra, [a / 64 for a in part.numbers("b", 5)]))
             first = last
         runs.append(run)
     return runs
+
+
+def own_level(level, extra):
+    """The level of detail that a sequence has at one of the clip."""
+    return level + math.ceil(level * extra / 16)
 
 
 def unpacked(block, count):
@@ -111,17 +117,18 @@ def unpacked(block, count):
 def scores(blob, runs, sets):
     """[sequence][row][curve]: the motion vectors of a clip, run after run."""
     part, level = Bytes(stream(blob)[1]["scores"]), 0
-    out = [[[None] * sets[cycles].rows for _, _, cycles, _ in run] for run in runs]
+    out = [[[None] * sets[cycles].rows for _, _, cycles, _, _ in run] for run in runs]
     curves = sets[0].curves
     while part.at < len(part.data):
         size, _ = part.varint(), part.take(4)  # checksum
         block, level = part.take(size), level + 1
         places = []  # run, sequence and row of each row of the block
         for r, run in enumerate(runs):
-            for i, (_, _, cycles, _) in enumerate(run):
-                kept = sets[cycles].rows_at(level - 1) if level > 1 else 0
-                shared = 1 if i > 0 and kept == 0 and sets[cycles].pinned else 0  # the end of the sequence before
-                places += [(row - kept - shared, r, i, row) for row in range(kept + shared, sets[cycles].rows_at(level))]
+            for i, (_, _, cycles, extra, _) in enumerate(run):
+                of = sets[cycles]
+                kept = of.rows_at(own_level(level - 1, extra)) if level > 1 else 0
+                shared = 1 if i > 0 and kept == 0 and of.pinned else 0  # the end of the sequence before
+                places += [(row - kept - shared, r, i, row) for row in range(kept + shared, of.rows_at(own_level(level, extra)))]
         steps = unpacked(block, len(places) * curves)
         for at, (_, r, i, row) in enumerate(sorted(places)):
             step = 1e-4 / math.sqrt(sets[runs[r][i][2]].pace)
@@ -155,7 +162,7 @@ def main(path, wanted=None):
     runs = sequences(blob("clip_warps"))
     vectors = scores(blob("clip_vectors"), runs, spaces[home]) if shutil.which("zstd") else []
     print("clip", name, "curves", spaces[home][0].curves)
-    for i, (first, last, cycles, warp) in enumerate(itertools.chain(*runs)):
+    for i, (first, last, cycles, _, warp) in enumerate(itertools.chain(*runs)):
         print("  frames", first, "to", last, "cycles", cycles, "warp", *warp)
         if vectors:
             print("    lengths", *[f"{math.hypot(*row):.4f}" for row in vectors[i] if row])

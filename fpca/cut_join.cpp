@@ -35,12 +35,13 @@ CutCorrection cut_correction(const SampleMatrix& left, const SampleMatrix& right
   const Eigen::Index n = left.rows() - 1;
   CutCorrection out;
   out.value = (right.row(0) - left.row(n)) / 2;
-  out.slope = Eigen::RowVectorXd::Zero(left.cols());
+  out.slope_before = Eigen::RowVectorXd::Zero(left.cols());
   if (n >= 1 && right.rows() >= 2) {
     const Eigen::RowVectorXd change = (right.row(1) - right.row(0)) - (left.row(n) - left.row(n - 1));
     const Eigen::RowVectorXd allowed = free_change * (typical_change(left) + typical_change(right)) / 2;
-    out.slope = excess(change, allowed) / 2;
+    out.slope_before = excess(change, allowed) / 2;
   }
+  out.slope_after = out.slope_before;
   return out;
 }
 

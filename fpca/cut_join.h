@@ -1,7 +1,8 @@
 // How two decoded sequences are joined at their common frame (JoinOptions in fpca/encoding.h).
 //
-// The left sequence gets `value` times Fade::value and minus `slope` times Fade::slope, the right one minus the first
-// and minus the second; both fade within `blend` of a sequence. Shared by decoding whole clips and by playback.
+// The left sequence gets `value` times Fade::value and minus `slope_before` times Fade::slope, the right one minus the
+// first and minus `slope_after` times the second; both fade within `blend` of a sequence. Shared by decoding whole clips
+// and by playback.
 #pragma once
 
 #include "kinespace/motion/uniform_spline.h"
@@ -23,7 +24,8 @@ struct Fade {
 // What both neighbours of a cut must give up, in values and in slopes (per frame).
 struct CutCorrection {
   Eigen::RowVectorXd value;  // to add on the left; the right adds the negative
-  Eigen::RowVectorXd slope;
+  Eigen::RowVectorXd slope_before;
+  Eigen::RowVectorXd slope_after;
 };
 
 // `left`, `right`: [frame][curve] of two sequences, the last frame of one being the first of the other. The part of the

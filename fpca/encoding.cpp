@@ -29,7 +29,7 @@ SampleMatrix integrate_travel(const SampleMatrix& samples, const Warp& warp, dou
 SampleMatrix decode_frames(const RegisteredSpace& all_sets, const EncodedSequence& sequence,
                            const Eigen::Vector3d& start, double rate_hz, int n) {
   const MotionSpace& space = all_sets.of(sequence.cycles);
-  SampleMatrix samples = space.samples(sequence.scores, n);
+  SampleMatrix samples = space.samples(sequence.scores, sequence.level(n));
   const int intervals = sequence.last - sequence.first;
   const Eigen::Vector3d travel = sequence.travel.cast<double>();
   samples.leftCols(travel_curves) = integrate_travel(samples, sequence.warp, intervals / rate_hz);
@@ -57,11 +57,11 @@ void join(SampleMatrix& frames, const CutCorrection* before, const CutCorrection
   for (Eigen::Index f = 0; f < frames.rows(); ++f) {
     if (before != nullptr) {
       const Fade w = fade(static_cast<double>(f) / n, options.blend);
-      frames.row(f) += -w.value * before->value - (w.slope * steepness) * before->slope;
+      frames.row(f) += -w.value * before->value - (w.slope * steepness) * before->slope_after;
     }
     if (after != nullptr) {
       const Fade w = fade((n - static_cast<double>(f)) / n, options.blend);
-      frames.row(f) += w.value * after->value - (w.slope * steepness) * after->slope;
+      frames.row(f) += w.value * after->value - (w.slope * steepness) * after->slope_before;
     }
   }
 }
@@ -135,6 +135,7 @@ EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const
           (curves.values.row(sequence.last) - curves.values.row(sequence.first)).head<3>().transpose().cast<float>();
       const MotionSpace& set = space.of(sequence.cycles);
       sequence.scores = set.scores(sampler.sample(sequence.first, sequence.last, sequence.warp, set.points()), compute);
+      set.drop_needless(sequence.scores);
       encoded.sequences.push_back(std::move(sequence));
     }
   }
@@ -162,7 +163,7 @@ void ClipDecoder::decode_in_parts(
       if (!last) {
         next = decode_frames(space_, run.sequences[i + 1], start, clip.rate_hz, n);
         after = cut_correction(frames, next, options.free_change);
-        if (left_out_) after->slope = left_out_->slope(run.sequences[i], run.sequences[i + 1], n);
+        if (left_out_) left_out_->correct(run.sequences[i], run.sequences[i + 1], n, *after);
       }
       join(frames, before ? &*before : nullptr, after ? &*after : nullptr, options);
       // The frame that two share is the later one's.

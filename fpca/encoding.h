@@ -22,6 +22,8 @@
 
 namespace kinespace {
 
+inline constexpr int most_extra_detail = 240;
+
 struct EncodedSequence {
   int first = 0;  // frames of the clip, both included
   int last = 0;
@@ -29,7 +31,11 @@ struct EncodedSequence {
   Warp warp;
   Eigen::Vector3f travel =
       Eigen::Vector3f::Zero();  // metres from the first to the last frame, heading 0 frame of the clip
-  ScoreMatrix scores;           // MotionSpace::rows() x C, of the set of its cycles
+  ScoreMatrix scores;           // MotionSpace::rows() x C, of the set of its cycles; 0 behind what it needs (encode)
+  int extra_detail = 0;         // 0 .. 240: fast motion takes more numbers at a level of detail (fpca/level_errors.h)
+
+  // The level of its function set that it has at level of detail n of the clip: (1 + extra_detail / 16) n, rounded up.
+  [[nodiscard]] int level(int n) const { return n <= 0 ? n : n + (n * extra_detail + 15) / 16; }
 };
 
 struct EncodedRun {
@@ -88,7 +94,8 @@ class RunSampler {
 };
 
 // `curves` must be on the space's side (MotionSpace::apply_references). One warp a sequence, in order; none:
-// identities.
+// identities. Where a share of the variance was asked for, each sequence has as many functions as it needs for it, and 0
+// behind them (MotionSpace::drop_needless): a body at rest few, a blow many.
 [[nodiscard]] EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
                                  const std::vector<Warp>& warps = {}, const Compute& compute = {});
 

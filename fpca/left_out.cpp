@@ -20,16 +20,17 @@ LeftOut::LeftOut(const RegisteredSpace& space) {
   }
 }
 
-// What is left out at a time of a sequence, added to `out`.
-void LeftOut::add_beside(const EncodedSequence& sequence, double own_time, int level, Eigen::RowVectorXd& out) const {
+// At a time of a sequence, by curve.
+Eigen::RowVectorXd LeftOut::left_out(const EncodedSequence& sequence, double own_time, int level) const {
+  Eigen::RowVectorXd out = Eigen::RowVectorXd::Zero(sequence.scores.cols());
   const Set& set = sets_[static_cast<std::size_t>(sequence.cycles)];
   const int kept =
-      set.rows_at[static_cast<std::size_t>(std::min<int>(level, static_cast<int>(set.rows_at.size()) - 1))];
+      set.rows_at[static_cast<std::size_t>(std::min(sequence.level(level), static_cast<int>(set.rows_at.size()) - 1))];
   const Eigen::Index rest = sequence.scores.rows() - std::max(kept, ends);
   const auto described = [&](const UniformSpline& functions) {
     return functions.curves() <= sequence.scores.rows() - ends;
   };
-  if (rest <= 0 || !std::ranges::all_of(set.functions, described)) return;
+  if (rest <= 0 || !std::ranges::all_of(set.functions, described)) return out;
   const double x = sequence.warp.space_time(own_time) * (set.points - 1);
   std::vector<Eigen::RowVectorXd> values;
   for (const UniformSpline& functions : set.functions) {
@@ -39,22 +40,24 @@ void LeftOut::add_beside(const EncodedSequence& sequence, double own_time, int l
   if (values.size() == 1) {
     const auto curves = out.size() - place_curves;
     out.tail(curves) += values.front().tail(rest) * sequence.scores.bottomRightCorner(rest, curves).cast<double>();
-    return;
+    return out;
   }
   for (Eigen::Index c = place_curves; c < out.size(); ++c) {
     const auto group = static_cast<std::size_t>(group_of_[static_cast<std::size_t>(c)]);
     out(c) += values[group].tail(rest).dot(sequence.scores.col(c).tail(rest).cast<double>());
-  }
+  }  return out;
 }
 
-Eigen::RowVectorXd LeftOut::slope(const EncodedSequence& left, const EncodedSequence& right, int level) const {
-  Eigen::RowVectorXd missing = Eigen::RowVectorXd::Zero(left.scores.cols());
-  const int before = left.last - left.first;
-  const int after = right.last - right.first;
-  if (level < 0 || before < 1 || after < 1) return missing;
-  add_beside(left, 1 - 1.0 / before, level, missing);
-  add_beside(right, 1.0 / after, level, missing);
-  return -missing / 2;
+void LeftOut::correct(const EncodedSequence& before, const EncodedSequence& after, int level,
+                      CutCorrection& correction) const {
+  const int frames_before = before.last - before.first;
+  const int frames_after = after.last - after.first;
+  if (level < 0 || frames_before < 1 || frames_after < 1) {
+    correction.slope_before = correction.slope_after = Eigen::RowVectorXd::Zero(before.scores.cols());
+    return;
+  }
+  correction.slope_before = -left_out(before, 1 - 1.0 / frames_before, level);
+  correction.slope_after = -left_out(after, 1.0 / frames_after, level);
 }
 
 }  // namespace kinespace

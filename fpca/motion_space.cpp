@@ -14,9 +14,14 @@
 namespace kinespace {
 namespace {
 
+// Of what a sequence may lose, the part that functions leave on average, since some sequences need more of them than
+// most, and the part that each sequence then leaves out.
+constexpr double left_by_functions = 0.1;
+constexpr double left_by_a_sequence = 0.5;
+
 FpcaOptions fpca_options(const MotionSpaceOptions& options) {
   FpcaOptions out;
-  out.variance_share = options.variance_share;
+  out.variance_share = 1 - left_by_functions * (1 - options.variance_share);
   out.count = options.functions;
   if (options.smooth) {
     out.mean = MeanEstimate::smooth;
@@ -215,7 +220,7 @@ FunctionGroup MotionSpace::fit_pinned(const CurveMoments& moments) const {
   const CurveMoments above = above_the_lines(moments);
   const double variance = variance_of(moments, weights_);
   const double of_functions = variance_of(above, weights_);
-  const double may_be_left = (1 - options_.variance_share) * variance;
+  const double may_be_left = left_by_functions * (1 - options_.variance_share) * variance;
   FpcaOptions options = fpca_options(options_);
   if (!options.count && may_be_left >= of_functions) options.count = 0;
   if (!options.count) options.variance_share = std::max(1e-12, 1 - may_be_left / of_functions);
@@ -255,6 +260,19 @@ ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& comp
     of_functions.col(c).head(g.functions.cols()) = (g.functions.transpose() * weighted).cast<float>();
   }
   return out;
+}
+
+void MotionSpace::drop_needless(ScoreMatrix& scores) const {
+  if (options_.functions) return;
+  const int ends = options_.pinned ? 2 : 0;
+  double variance = 0;  // of all curves of a sequence
+  for (int c = 0; c < curves(); ++c) variance += groups_[static_cast<std::size_t>(group_of(c))].variance;
+  double may_go = left_by_a_sequence * (1 - options_.variance_share) * variance;
+  for (Eigen::Index row = scores.rows(); row-- > ends;) {
+    may_go -= scores.row(row).cast<double>().squaredNorm();
+    if (may_go < 0) return;
+    scores.row(row).setZero();
+  }
 }
 
 void MotionSpace::add_ends(const ScoreMatrix& scores, SampleMatrix& samples) const {

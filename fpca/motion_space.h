@@ -45,7 +45,8 @@ enum class Grouping : std::uint8_t {
 struct MotionSpaceOptions {
   Grouping grouping = Grouping::all_together;
   int points = 0;                    // T, 4 .. 1024; 0: those of the longest sequence and 12
-  double variance_share = 0.999999;  // of the curves' variance that the functions cover, in (0, 1] ...
+  double variance_share = 0.999999;  // of the curves' variance that every sequence keeps, in (0, 1]; functions cover it
+                                     // so that a tenth as much is left, for the sequences that need them ...
   std::optional<int> functions;      // ... or a count, 1 .. T
   bool smooth = false;  // smooth mean and covariance and take the noise off (PACE); clean motion needs none
   bool pinned = false;  // the ends of sequences are kept apart
@@ -100,6 +101,9 @@ class MotionSpace {
   // T x C samples to scores (rows() x C) and back, at level of detail n (all when n < 0 or too large).
   [[nodiscard]] ScoreMatrix scores(const SampleMatrix& samples, const Compute& compute = {}) const;
   [[nodiscard]] SampleMatrix samples(const ScoreMatrix& scores, int n = -1) const;
+  // Sets to 0 the last functions' scores of a sequence, as many as together hold no more than half of (1 -
+  // variance_share) of the variance; none where a count of functions was asked for.
+  void drop_needless(ScoreMatrix& scores) const;
   // Scores in this space of what the scores were in another one of the same grid and curves (after it was extended).
   [[nodiscard]] ScoreMatrix transfer(const ScoreMatrix& scores, const MotionSpace& from) const;
 

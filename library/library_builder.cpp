@@ -11,6 +11,7 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
+#include "kinespace/fpca/level_errors.h"
 #include "kinespace/library/detail/space_codec.h"
 #include "kinespace/library/library_view.h"
 #include "kinespace/motion/file_formats.h"
@@ -124,42 +125,15 @@ PreparedSource source_of_imports(const std::vector<const Import*>& imports, cons
           }};
 }
 
-// Of the joints of two clips, part by part.
-class JointDistance {
- public:
-  void add(const JointPositions& a, const JointPositions& b) {
-    for (std::size_t i = 0; i < a.values.size(); ++i) {
-      const double e = (a.values[i] - b.values[i]).norm();
-      sum_ += e;
-      worst_ = std::max(worst_, e);
-    }
-    count_ += a.values.size();
-  }
-  [[nodiscard]] MeasuredError error() const {
-    return {.mean_joint_error_cm = sum_ / static_cast<double>(count_), .max_joint_error_cm = worst_};
-  }
-
- private:
-  double sum_ = 0;
-  double worst_ = 0;
-  std::size_t count_ = 0;
-};
-
 MeasuredError distance(const JointPositions& a, const JointPositions& b) {
-  JointDistance out;
-  out.add(a, b);
-  return out.error();
-}
-
-MeasuredError measure_error(const PreparedClip& clip, const ClipDecoder& decoder, const EncodedClip& encoded,
-                            int level) {
-  JointDistance out;
-  decoder.decode_in_parts(encoded, level, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
-    const auto original = clip.curves.values.middleRows(first, rows.rows());
-    out.add(joint_positions(clip_of_frames(clip.curves, original, first, clip.skeleton)),
-            joint_positions(clip_of_frames(clip.curves, rows, first, clip.skeleton)));
-  });
-  return out.error();
+  double sum = 0;
+  double worst = 0;
+  for (std::size_t i = 0; i < a.values.size(); ++i) {
+    const double e = (a.values[i] - b.values[i]).norm();
+    sum += e;
+    worst = std::max(worst, e);
+  }
+  return {.mean_joint_error_cm = sum / static_cast<double>(a.values.size()), .max_joint_error_cm = worst};
 }
 
 void count_cycles(const EncodedClip& clip, LibraryReport& report) {
@@ -170,14 +144,6 @@ void count_cycles(const EncodedClip& clip, LibraryReport& report) {
       report.cyclic_seconds += (s.last - s.first) / clip.rate_hz;
     }
   }
-}
-
-// The levels of detail whose errors are measured: all that are ever played by themselves, and fewer and fewer beyond.
-std::vector<int> measured_levels(int all) {
-  std::vector<int> out;
-  for (int level = 1; level < all; level = level < 6 ? level + 1 : level + level / 4) out.push_back(level);
-  if (all > 0) out.push_back(all);
-  return out;
 }
 
 // What a space does with the clips of one joint tree.
@@ -225,11 +191,7 @@ class SpaceWriter {
     out.clip = encode(built_.space, prepared.curves, built_.runs_of(index, prepared.runs),
                       built_.warps[static_cast<std::size_t>(index)], compute_);
     round_to_stored(out.clip, built_.space);
-    for (const int level : measured_levels(built_.space.levels())) {
-      out.clip.levels.push_back({level, measure_error(prepared, decoder_, out.clip, level)});
-    }
-    out.clip.error =
-        out.clip.levels.empty() ? measure_error(prepared, decoder_, out.clip, -1) : out.clip.levels.back().error;
+    measure_levels(decoder_, prepared.curves, prepared.skeleton, built_.space.levels(), out.clip);
     out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
     return out;

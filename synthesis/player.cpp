@@ -23,7 +23,8 @@ using Indices = int __attribute__((vector_size(lanes * sizeof(int))));
 
 // A neighbouring cut's part in a pose: its corrections and by how much they count; none: nullptr.
 struct CutPart {
-  const float* correction = nullptr;
+  const float* values = nullptr;
+  const float* slopes = nullptr;
   float value = 0;
   float slope = 0;
 };
@@ -100,9 +101,9 @@ KINESPACE_SIMD_BODY void place_root(PoseJob& job) {
     }
   }
   for (const CutPart& cut : job.cuts) {
-    if (cut.correction == nullptr) continue;
+    if (cut.values == nullptr) continue;
     Four slope;
-    std::memcpy(&slope, cut.correction + 8 * static_cast<std::ptrdiff_t>(job.joint_lanes), sizeof(Four));
+    std::memcpy(&slope, cut.slopes + 4 * static_cast<std::ptrdiff_t>(job.joint_lanes), sizeof(Four));
     sum -= cut.slope * slope;
   }
   std::memcpy(job.place, &sum, sizeof(Four));
@@ -176,12 +177,12 @@ KINESPACE_SIMD_BODY void play_body(PoseJob& job) {
       }
     }
     for (const CutPart& cut : job.cuts) {
-      if (cut.correction == nullptr) continue;
+      if (cut.values == nullptr) continue;
       for (int q = 0; q < 4; ++q) {
         Vector value;
         Vector slope;
-        std::memcpy(&value, cut.correction + q * job.joint_lanes + start, sizeof(Vector));
-        std::memcpy(&slope, cut.correction + (4 + q) * job.joint_lanes + start, sizeof(Vector));
+        std::memcpy(&value, cut.values + q * job.joint_lanes + start, sizeof(Vector));
+        std::memcpy(&slope, cut.slopes + q * job.joint_lanes + start, sizeof(Vector));
         sum[q] += cut.value * value - cut.slope * slope;
       }
     }
@@ -200,12 +201,14 @@ void add_cut_parts(const PlayerParts& parts, const PlayerParts::Place& place, in
   };
   if (sequence.joined_before && place.own < blend) {
     const Fade weight = fade(place.own, blend);
-    out[0] = {at(parts.sequences[place.sequence - 1].cut), static_cast<float>(-weight.value),
+    const float* cut = at(parts.sequences[place.sequence - 1].cut);
+    out[0] = {cut, cut + parts.rotation_floats() + parts.slope_floats(), static_cast<float>(-weight.value),
               static_cast<float>(weight.slope) * sequence.steepness};
   }
   if (sequence.joined_after && 1 - place.own < blend) {
     const Fade weight = fade(1 - place.own, blend);
-    out[1] = {at(sequence.cut), static_cast<float>(weight.value),
+    const float* cut = at(sequence.cut);
+    out[1] = {cut, cut + parts.rotation_floats(), static_cast<float>(weight.value),
               static_cast<float>(weight.slope) * sequence.steepness};
   }
 }
@@ -298,7 +301,7 @@ Eigen::Vector3f Player::pose(double time_s, int functions, std::span<float> rota
   const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
   const int level = parts.level(functions);
   PoseJob job;
-  job.functions = basis.rows_at(sequence.set, level);
+  job.functions = parts.rows_at(sequence, level);
   job.scores = parts.scores.data() + sequence.scores;
   job.score_stride = static_cast<std::ptrdiff_t>(parts.score_stride());
   job.values_stride = basis.values_stride(sequence.set);
@@ -332,7 +335,7 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
   const PlayerParts::Place place = parts.place_at(time_s);
   const PlayerParts::Sequence& sequence = parts.sequences[place.sequence];
   const int level = parts.level(functions);
-  const int rows = basis.rows_at(sequence.set, level);
+  const int rows = parts.rows_at(sequence, level);
   CutPart cuts[2];
   add_cut_parts(parts, place, level, cuts);
   const auto cubic = [&](const float* c) {
@@ -360,8 +363,8 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
                                        parts.rotation_floats() + static_cast<std::size_t>(axis)]);
     }
     for (const CutPart& cut : cuts) {
-      if (cut.correction != nullptr)
-        sum -= cut.slope * cut.correction[2 * parts.rotation_floats() + static_cast<std::size_t>(axis)];
+      if (cut.values != nullptr)
+        sum -= cut.slope * cut.slopes[parts.rotation_floats() + static_cast<std::size_t>(axis)];
     }
     from_start[axis] = sum;
   }
@@ -376,8 +379,8 @@ Eigen::Vector3f pose(const Player& player, double time_s, int functions, std::sp
         sum += value(curve, k) * scores[static_cast<std::size_t>(k - 1) * parts.score_stride() + column];
       }
       for (const CutPart& cut : cuts) {
-        if (cut.correction == nullptr) continue;
-        sum += cut.value * cut.correction[column] - cut.slope * cut.correction[parts.rotation_floats() + column];
+        if (cut.values == nullptr) continue;
+        sum += cut.value * cut.values[column] - cut.slope * cut.slopes[column];
       }
       q[component] = sum;
     }
@@ -431,7 +434,7 @@ class GrowingSequence {
   }
 
   void grow_to(int level) {
-    const int rows = parts_.basis->rows_at(sequence_.set, level);
+    const int rows = parts_.rows_at(sequence_, level);
     while (entries_ < rows) add_entry(++entries_);
   }
   [[nodiscard]] const SampleMatrix& frames() const { return frames_; }
@@ -540,7 +543,10 @@ PlayerParts::PlayerParts(std::shared_ptr<const PlaybackBasis> basis_in, const En
 }
 
 void PlayerParts::add_sequence(const EncodedSequence& encoded, double rate, const Eigen::Vector3d& start) {
-  Sequence out{.first = encoded.first, .intervals = encoded.last - encoded.first, .set = encoded.cycles};
+  Sequence out{.first = encoded.first,
+               .intervals = encoded.last - encoded.first,
+               .set = encoded.cycles,
+               .extra_detail = encoded.extra_detail};
   out.start = start;
   out.warped = !encoded.warp.is_identity();
   out.duration_s = static_cast<float>(out.intervals / rate);
@@ -560,10 +566,10 @@ void PlayerParts::add_sequence(const EncodedSequence& encoded, double rate, cons
   }
   scores.resize((scores.size() + PlaybackBasis::lanes - 1) / PlaybackBasis::lanes * PlaybackBasis::lanes, 0.0F);
   out.scores = scores.size();
-  const Eigen::Index rows = basis->rows(out.set);
-  scores.resize(scores.size() + static_cast<std::size_t>(rows) * score_stride(), 0.0F);
-  const Eigen::Index known = std::min(rows, encoded.scores.rows());
-  for (Eigen::Index k = 0; k < known; ++k) {
+  out.rows = std::min(basis->rows(out.set), static_cast<int>(encoded.scores.rows()));
+  while (out.rows > 0 && encoded.scores.row(out.rows - 1).isZero(0)) --out.rows;
+  scores.resize(scores.size() + static_cast<std::size_t>(out.rows) * score_stride(), 0.0F);
+  for (int k = 0; k < out.rows; ++k) {
     float* row = scores.data() + out.scores + static_cast<std::size_t>(k) * score_stride();
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       row[rotation_floats() + static_cast<std::size_t>(axis)] = encoded.scores(k, axis);
@@ -594,15 +600,21 @@ void PlayerParts::add_cuts(std::size_t first, const EncodedRun& run) {
     for (std::size_t level = 0; level < levels; ++level) {
       left.grow_to(static_cast<int>(level));
       right.grow_to(static_cast<int>(level));
-      const CutCorrection correction = cut_correction(left.frames(), right.frames(), options.join.free_change);
-      float* out = cuts.data() + sequences[i].cut + level * cut_stride();
+      CutCorrection correction = cut_correction(left.frames(), right.frames(), options.join.free_change);
+      float* values = cuts.data() + sequences[i].cut + level * cut_stride();
+      float* before = values + rotation_floats();
+      float* after = before + slope_floats();
       const auto columns = static_cast<Eigen::Index>(rotation_floats());
-      Eigen::Map<Eigen::RowVectorXf>(out, columns) = correction.value.head(columns).cast<float>();
-      // Both neighbours end where the root is: there is no value to correct, only its slope.
-      Eigen::Map<Eigen::RowVectorXf>(out + columns, columns + 4) = correction.slope.cast<float>();
+      Eigen::Map<Eigen::RowVectorXf>(values, columns) = correction.value.head(columns).cast<float>();
       if (basis->left_out() != nullptr) {
         const auto& s = run.sequences;
-        put_slopes(basis->left_out()->slope(s[i - first], s[i - first + 1], static_cast<int>(level)), out + columns);
+        basis->left_out()->correct(s[i - first], s[i - first + 1], static_cast<int>(level), correction);
+        put_slopes(correction.slope_before, before);
+        put_slopes(correction.slope_after, after);
+      } else {
+        // Both neighbours end where the root is: there is no value to correct, only its slope.
+        Eigen::Map<Eigen::RowVectorXf>(before, columns + 4) = correction.slope_before.cast<float>();
+        Eigen::Map<Eigen::RowVectorXf>(after, columns + 4) = correction.slope_after.cast<float>();
       }
     }
   }

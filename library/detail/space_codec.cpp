@@ -127,8 +127,8 @@ struct RowRange {
   int first = 0;
   int last = 0;  // behind it
 };
-RowRange rows_of_level(const MotionSpace& set, int level, bool shares_start) {
-  RowRange out{level == 1 ? 0 : set.rows_at(level - 1), set.rows_at(level)};
+RowRange rows_of_level(const MotionSpace& set, const EncodedSequence& sequence, int level, bool shares_start) {
+  RowRange out{level == 1 ? 0 : set.rows_at(sequence.level(level - 1)), set.rows_at(sequence.level(level))};
   if (shares_start && set.options().pinned && out.first == 0) ++out.first;
   return out;
 }
@@ -142,7 +142,7 @@ void for_each_row(Clip& clip, const RegisteredSpace& space, int level, const Vis
     for (auto& run : clip.runs) {
       for (std::size_t k = 0; k < run.sequences.size(); ++k) {
         auto& sequence = run.sequences[k];
-        const RowRange rows = rows_of_level(space.of(sequence.cycles), level, k > 0);
+        const RowRange rows = rows_of_level(space.of(sequence.cycles), sequence, level, k > 0);
         if (rows.first + i < rows.last) visit(sequence, rows.first + i);
         more = more || rows.first + i + 1 < rows.last;
       }
@@ -161,7 +161,19 @@ Bytes score_block(const EncodedClip& clip, const RegisteredSpace& space, int lev
   return pack_floats(steps);
 }
 
-Bytes pack_sequences(const EncodedClip& clip, bool kinds) {
+// What sequences say besides where they lie.
+struct SequenceFields {
+  bool kinds = false;         // how many cycles they hold
+  bool extra_detail = false;  // how many more numbers they take
+};
+
+bool has_extra_detail(const EncodedClip& clip) {
+  return std::ranges::any_of(clip.runs, [](const EncodedRun& run) {
+    return std::ranges::any_of(run.sequences, [](const EncodedSequence& s) { return s.extra_detail > 0; });
+  });
+}
+
+Bytes pack_sequences(const EncodedClip& clip, SequenceFields fields) {
   ByteWriter out;
   put_varint(out, clip.runs.size());
   for (const EncodedRun& run : clip.runs) {
@@ -169,16 +181,16 @@ Bytes pack_sequences(const EncodedClip& clip, bool kinds) {
     put_varint(out, static_cast<std::uint64_t>(run.sequences.front().first));
     for (const EncodedSequence& s : run.sequences) {
       put_varint(out, static_cast<std::uint64_t>(s.last - s.first));
-      if (kinds) out.put(static_cast<std::uint8_t>(s.cycles));
+      if (fields.kinds) out.put(static_cast<std::uint8_t>(s.cycles));
+      if (fields.extra_detail) out.put(static_cast<std::uint8_t>(s.extra_detail));
       for (const std::int8_t a : s.warp.coefficients()) out.put(a);
     }
   }
   return std::move(out).take();
 }
 
-// Runs and sequences without their scores. Together they must hold the frames of the clip once. `kinds`: whether each
-// says how many cycles it holds.
-void unpack_sequences(ByteReader in, const RegisteredSpace& space, bool kinds, EncodedClip& clip) {
+// Runs and sequences without their scores. Together they must hold the frames of the clip once.
+void unpack_sequences(ByteReader in, const RegisteredSpace& space, SequenceFields fields, EncodedClip& clip) {
   const std::size_t runs = get_count(in, 2, "runs");
   std::int64_t next = 0;
   for (std::size_t r = 0; r < runs; ++r) {
@@ -192,17 +204,20 @@ void unpack_sequences(ByteReader in, const RegisteredSpace& space, bool kinds, E
       const std::uint64_t length = get_varint(in);
       if (length > static_cast<std::uint64_t>(clip.frames))
         in.fail("a sequence beyond the clip's end", "frames of the clip");
-      const int cycles = kinds ? in.get<std::uint8_t>() : 0;
+      const int cycles = fields.kinds ? in.get<std::uint8_t>() : 0;
       if (!space.has(cycles)) {
         in.fail(fmt::format("a sequence of {} cycles", cycles), "a kind of sequence that the space has functions for");
       }
+      const int extra_detail = fields.extra_detail ? in.get<std::uint8_t>() : 0;
+      if (extra_detail > most_extra_detail) in.fail(fmt::format("a detail of {}", extra_detail), "0 to 240");
       Warp::Coefficients coefficients{};
       for (std::int8_t& a : coefficients) a = in.get<std::int8_t>();
       if (!Warp::legal(coefficients)) in.fail("a time warp that is not monotone", "slopes within [1/2, 2]");
       EncodedSequence s{.first = static_cast<int>(at),
                         .last = static_cast<int>(at + static_cast<std::int64_t>(length)),
                         .cycles = cycles,
-                        .warp = Warp(coefficients)};
+                        .warp = Warp(coefficients),
+                        .extra_detail = extra_detail};
       at = s.last;
       if (at >= clip.frames || (length == 0 && count > 1))
         in.fail("a sequence beyond the clip's end", "frames of the clip");
@@ -475,10 +490,11 @@ PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   vectors.set_error(clip.error);
   vectors.add_progressive_section("scores", blocks);
   out.vectors = vectors.finish();
-  const bool kinds = space.sets().size() > 1;
+  const SequenceFields fields{.kinds = space.sets().size() > 1, .extra_detail = has_extra_detail(clip)};
   BitstreamWriter warps("clip-warps");
-  if (kinds) warps.set_option("kinds", std::int64_t{1});
-  warps.add_section("sequences", pack_sequences(clip, kinds));
+  if (fields.kinds) warps.set_option("kinds", std::int64_t{1});
+  if (fields.extra_detail) warps.set_option("extra_detail", std::int64_t{1});
+  warps.add_section("sequences", pack_sequences(clip, fields));
   out.warps = warps.finish();
   BitstreamWriter side("clip-side");
   side.add_section("side", pack_side(clip));
@@ -506,8 +522,11 @@ EncodedClip unpack_clip(const PackedClip& packed, const RegisteredSpace& space, 
   EncodedClip clip{.name = header.name, .rate_hz = header.rate_hz, .frames = header.frames};
   const Bitstream warps = Bitstream::parse(packed.warps, source);
   warps.require_kind("clip-warps");
-  const bool kinds = warps.find_option("kinds") != nullptr && warps.integer_option("kinds", 0, 1) == 1;
-  unpack_sequences(ByteReader(warps.section("sequences"), source), space, kinds, clip);
+  const auto has = [&warps](const char* option) {
+    return warps.find_option(option) != nullptr && warps.integer_option(option, 0, 1) == 1;
+  };
+  const SequenceFields fields{.kinds = has("kinds"), .extra_detail = has("extra_detail")};
+  unpack_sequences(ByteReader(warps.section("sequences"), source), space, fields, clip);
   const Bitstream side = Bitstream::parse(packed.side, source);
   side.require_kind("clip-side");
   unpack_side(ByteReader(side.section("side"), source), clip, skeleton, source);

@@ -14,7 +14,9 @@ struct PlayerParts {
   struct Sequence {
     int first = 0;
     int intervals = 0;
-    int set = 0;  // of the basis
+    int set = 0;   // of the basis
+    int rows = 0;  // of scores: those behind are 0
+    int extra_detail = 0;
     bool warped = false;
     bool joined_before = false;  // begins at a cut
     bool joined_after = false;   // ends at one
@@ -29,6 +31,11 @@ struct PlayerParts {
     std::size_t inverse = 0;  // into scores, before them: value and slope of the warp's inverse at 0, 1/64, .., 1
     std::size_t cut = 0;      // into cuts: the correction where it ends, when joined_after
   };
+  // How many rows a sequence has at a level of detail.
+  [[nodiscard]] int rows_at(const Sequence& sequence, int level) const {
+    const int own = std::min(EncodedSequence{.extra_detail = sequence.extra_detail}.level(level), basis->levels());
+    return std::min(sequence.rows, basis->rows_at(sequence.set, own));
+  }
   struct Place {
     std::size_t sequence = 0;
     double own = 0;  // [0, 1] of the sequence's own time
@@ -59,7 +66,9 @@ struct PlayerParts {
   // Floats of the rotations in a row, and of all of it: whole cache lines.
   [[nodiscard]] std::size_t rotation_floats() const { return 4 * static_cast<std::size_t>(lanes); }
   [[nodiscard]] std::size_t score_stride() const { return rotation_floats() + PlaybackBasis::lanes; }
-  [[nodiscard]] std::size_t cut_stride() const { return 2 * rotation_floats() + PlaybackBasis::lanes; }
+  // A cut's corrections at a level: values, slopes before it, slopes after it.
+  [[nodiscard]] std::size_t slope_floats() const { return rotation_floats() + PlaybackBasis::lanes; }
+  [[nodiscard]] std::size_t cut_stride() const { return rotation_floats() + 2 * slope_floats(); }
   [[nodiscard]] int level(int functions) const {
     return functions < 0 || functions > basis->levels() ? basis->levels() : functions;
   }

@@ -89,7 +89,7 @@ def numbers(path):
         if runs[0][0][0] != 0 or runs[-1][-1][1] != frames - 1:
             yield f"sequences from {runs[0][0][0]} to {runs[-1][-1][1]} in {frames} frames"
         parts = [part for run in runs for part in run]
-        for (_, _, cycles, _), vector in zip(parts, read_library.scores(vectors, runs, sets)):
+        for (_, _, cycles, _, _), vector in zip(parts, read_library.scores(vectors, runs, sets)):
             of = sets[cycles]
             for c in range(of.curves):
                 g = group_of(c, len(of.groups))
@@ -99,9 +99,11 @@ def numbers(path):
         for run in runs:
             yield from (f"a sequence ends at {a[1]}, the next begins at {b[0]}" for a, b in zip(run, run[1:]) if a[1] != b[0])
     for cycles, of in sets.items():
-        for (_, _, _, eigenvalues, _), sums, count in zip(of.groups, squares[cycles], counts[cycles]):
+        for (variance, _, _, eigenvalues, _), sums, count in zip(of.groups, squares[cycles], counts[cycles]):
+            # Scores are kept in steps of 1e-4, and a sequence leaves out half of a millionth of the variance.
+            tolerance = 1e-7 + 0.5e-6 * variance
             for k, (value, total) in enumerate(zip(eigenvalues, sums)):
-                if count and abs(total / max(1, count - 1) - value) > 0.03 * value + 1e-7:  # scores are kept in steps of 1e-4
+                if count and abs(total / max(1, count - 1) - value) > 0.03 * value + tolerance:
                     yield f"{cycles} cycles, function {k}: eigenvalue {value}, mean square of the scores {total / (count - 1)}"
 
 

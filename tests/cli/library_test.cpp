@@ -1,7 +1,11 @@
 // build, query, export and info as a user runs them, on the sample clips.
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -57,6 +61,29 @@ TEST_F(LibraryCommands, info_describes_the_library_in_the_promised_keys) {
        {"frames", "rate_hz", "joints", "height_cm", "clips", "sequences", "functions", "variance", "bytes"}) {
     EXPECT_TRUE(info.contains(key) && info[key].is_number()) << key;
   }
+}
+
+TEST_F(LibraryCommands, info_draws_the_cycles_of_a_clip) {
+  const auto picture_of = [](const std::vector<std::string>& what) {
+    std::vector<std::string> words{"info"};
+    words.insert(words.end(), what.begin(), what.end());
+    words.insert(words.end(), {"--picture", out("registration.svg").string()});
+    const CommandResult result = run_command(words);
+    EXPECT_EQ(result.code, 0) << result.err;
+    std::ifstream file(out("registration.svg"));
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const std::string of_library = picture_of({library().string(), "--clip", "walk_normal_001"});
+  EXPECT_NE(of_library.find("walk_normal_001: "), std::string::npos);
+  EXPECT_NE(of_library.find("whole cycles, time linear in each"), std::string::npos);
+  EXPECT_NE(picture_of({library().string()}).find("whole cycles, time linear in each"), std::string::npos);
+  EXPECT_NE(picture_of({(clips() / "walk_normal_001.bvh").string()}).find("before: "), std::string::npos);
+  EXPECT_NE(picture_of({(clips() / "stand_calm_001.bvh").string()}).find("no whole cycles found"), std::string::npos);
+  const CommandResult unknown =
+      run_command({"info", library().string(), "--picture", out("x.svg").string(), "--clip", "walk_normal_002"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_NE(unknown.err.find("walk_normal_001"), std::string::npos) << "the nearest name";
+  EXPECT_FALSE(std::filesystem::exists(out("x.svg")));
 }
 
 TEST_F(LibraryCommands, query_lists_the_nearest_first) {

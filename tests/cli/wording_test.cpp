@@ -175,7 +175,7 @@ TEST_F(Wording, the_largest_error_is_that_from_the_clip_as_it_was_read) {
     return nlohmann::json::parse(run_command({"compare", clip, at("o.bvh"), "--json"}).out)["max_joint_error_cm"]
         .get<double>();
   };
-  for (const double bound : {8.0, 2.0, 0.6}) {
+  for (const double bound : {8.0, 2.0, 0.5}) {
     ASSERT_EQ(
         run_command({"export", library(), "walk_fast_001", "-o", at("o.bvh"), "--max-error", std::to_string(bound)})
             .code,

@@ -52,7 +52,10 @@ TEST_P(LibraryFixture, plays_as_near_to_what_was_read_as_was_measured_when_it_wa
   EXPECT_LT(error.mean_joint_error_cm, 1);
   for (const LevelError& l : encoded.levels) {
     const Clip decoded = clip_from_curves(decode(space(), encoded, l.level), original.skeleton);
-    EXPECT_NEAR(compare(original, decoded).mean_joint_error_cm, l.error.mean_joint_error_cm, 1e-3) << l.level;
+    // Slopes beside cuts have come nearer since version 2.
+    const double measured = compare(original, decoded).mean_joint_error_cm;
+    EXPECT_LE(measured, l.error.mean_joint_error_cm + 1e-3) << l.level;
+    EXPECT_GE(measured, 0.95 * l.error.mean_joint_error_cm - 1e-3) << l.level;
   }
 }
 

@@ -75,7 +75,7 @@ TEST_F(Transitions, heights_of_the_ground_stay) {
   const JointPositions positions = joint_positions(plan->transition.clip);
   double lowest = 1e9;
   for (const auto& p : positions.values) lowest = std::min(lowest, p.y());
-  EXPECT_GT(lowest, -4);
+  EXPECT_GT(lowest, -3);
   EXPECT_LT(lowest, 4);
 }
 

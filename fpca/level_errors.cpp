@@ -1,0 +1,104 @@
+#include "kinespace/fpca/level_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "kinespace/motion/kinematics.h"
+
+namespace kinespace {
+namespace {
+
+// Of one level: of the clip, and the largest error in each of its sequences, in order.
+struct MeasuredLevel {
+  MeasuredError error;
+  std::vector<double> worst;
+};
+
+MeasuredLevel measure_level(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton,
+                            const EncodedClip& clip, int level) {
+  MeasuredLevel out;
+  double sum = 0;
+  double count = 0;
+  double worst = 0;
+  decoder.decode_in_parts(clip, level, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
+    const auto read = original.values.middleRows(first, rows.rows());
+    const JointPositions a = joint_positions(clip_of_frames(original, read, first, skeleton));
+    const JointPositions b = joint_positions(clip_of_frames(original, rows, first, skeleton));
+    double largest = 0;
+    for (std::size_t i = 0; i < a.values.size(); ++i) {
+      const double e = (a.values[i] - b.values[i]).norm();
+      sum += e;
+      largest = std::max(largest, e);
+    }
+    count += static_cast<double>(a.values.size());
+    worst = std::max(worst, largest);
+    out.worst.push_back(largest);
+  });
+  out.error = {.mean_joint_error_cm = sum / count, .max_joint_error_cm = worst};
+  return out;
+}
+
+using MeasuredLevels = std::map<int, MeasuredLevel>;
+
+MeasuredLevels measure(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton, int levels,
+                       const EncodedClip& clip) {
+  MeasuredLevels out;
+  for (const int level : measured_levels(levels)) {
+    out.emplace(level, measure_level(decoder, original, skeleton, clip, level));
+  }
+  return out;
+}
+
+constexpr int finest_level_meant = 10;  // beyond it errors are those of the recording: noise, lost markers
+
+// The least that takes a sequence within what each level is meant to leave; what no level reaches asks for nothing.
+int extra_detail(const MeasuredLevels& measured, std::size_t sequence) {
+  int out = 0;
+  for (auto meant = measured.begin(); meant != measured.upper_bound(finest_level_meant); ++meant) {
+    const double largest = largest_error_meant(meant->first);
+    // From there on it is never left, though more functions are now and then worse in a single frame.
+    auto enough = measured.end();
+    while (enough != meant && std::prev(enough)->second.worst[sequence] <= largest) --enough;
+    if (enough == measured.end()) continue;
+    const int extra = (16 * (enough->first - meant->first) + meant->first - 1) / meant->first;
+    out = std::max(out, std::min(extra, most_extra_detail));
+  }
+  return out;
+}
+
+bool give_detail(const MeasuredLevels& measured, EncodedClip& clip) {
+  bool any = false;
+  std::size_t number = 0;
+  for (EncodedRun& run : clip.runs) {
+    for (EncodedSequence& sequence : run.sequences) {
+      sequence.extra_detail = extra_detail(measured, number++);
+      any = any || sequence.extra_detail > 0;
+    }
+  }
+  return any;
+}
+
+}  // namespace
+
+double largest_error_meant(int level) {
+  return 11.5 * std::pow(5.0 / level, 1.25);
+}
+
+std::vector<int> measured_levels(int levels) {
+  std::vector<int> out;
+  for (int level = 1; level < levels; level = level < 6 ? level + 1 : level + level / 4) out.push_back(level);
+  if (levels > 0) out.push_back(levels);
+  return out;
+}
+
+void measure_levels(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton, int levels,
+                    EncodedClip& clip) {
+  MeasuredLevels measured = measure(decoder, original, skeleton, levels, clip);
+  if (give_detail(measured, clip)) measured = measure(decoder, original, skeleton, levels, clip);
+  clip.levels.clear();
+  for (const auto& [level, of_level] : measured) clip.levels.push_back({level, of_level.error});
+  clip.error = clip.levels.empty() ? measure_level(decoder, original, skeleton, clip, -1).error : clip.levels.back().error;
+}
+
+}  // namespace kinespace
