@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <numbers>
+#include <limits>
 #include <utility>
 
 #include "kinespace/base/error.h"
@@ -48,6 +48,34 @@ SampleMatrix decode_frames(const RegisteredSpace& all_sets, const EncodedSequenc
     out.row(f).head<3>() += start.transpose() + u * missing;
   }
   return out;
+}
+
+// The scores of a sequence. A recording may go to and fro from one frame to the next, faster than the grid follows: then
+// what its frames miss is given to the samples, until it is there or no nearer.
+ScoreMatrix scores_of(const RegisteredSpace& space, const SampleMatrix& values, const RunSampler& sampler,
+                      EncodedSequence sequence, double rate_hz, const Compute& compute) {
+  constexpr double enough = 0.002;  // of a quaternion
+  constexpr int most_rounds = 4;
+  const MotionSpace& set = space.of(sequence.cycles);
+  const int last = sequence.last - sequence.first;
+  SampleMatrix samples = sampler.sample(sequence.first, sequence.last, sequence.warp, set.points());
+  ScoreMatrix best = set.scores(samples, compute);
+  double least = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < most_rounds && last > 1; ++round) {
+    sequence.scores = round == 0 ? best : set.scores(samples, compute);
+    SampleMatrix missing = values.middleRows(sequence.first, last + 1) -
+                           decode_frames(space, sequence, Eigen::Vector3d::Zero(), rate_hz, -1);
+    missing.leftCols<travel_curves>().setZero();
+    missing.row(0).setZero();  // ends are shared with the neighbours
+    missing.row(last).setZero();
+    const double most = missing.cwiseAbs().maxCoeff();
+    if (most >= least) break;
+    best = sequence.scores;
+    least = most;
+    if (most < enough) break;
+    samples += RunSampler(missing, Run{{0, last}}, rate_hz).sample(0, last, sequence.warp, set.points());
+  }
+  return best;
 }
 
 // Takes out of a sequence what does not fit at the cuts before and after it; null: there is none.
@@ -133,9 +161,8 @@ EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const
       if (!warps.empty()) sequence.warp = warps.at(warp++);
       sequence.travel =
           (curves.values.row(sequence.last) - curves.values.row(sequence.first)).head<3>().transpose().cast<float>();
-      const MotionSpace& set = space.of(sequence.cycles);
-      sequence.scores = set.scores(sampler.sample(sequence.first, sequence.last, sequence.warp, set.points()), compute);
-      set.drop_needless(sequence.scores);
+      sequence.scores = scores_of(space, curves.values, sampler, sequence, curves.rate_hz, compute);
+      space.of(sequence.cycles).drop_needless(sequence.scores);
       encoded.sequences.push_back(std::move(sequence));
     }
   }

@@ -79,6 +79,25 @@ bool give_detail(const MeasuredLevels& measured, EncodedClip& clip) {
   return any;
 }
 
+// Beside neighbours of fewer numbers a sequence may still err more than all at that level did: then it takes a few more.
+bool raise_detail(const MeasuredLevels& measured, EncodedClip& clip) {
+  constexpr int step = 4;
+  bool any = false;
+  std::size_t number = 0;
+  for (EncodedRun& run : clip.runs) {
+    for (EncodedSequence& sequence : run.sequences) {
+      const bool too_far = std::any_of(measured.begin(), measured.upper_bound(finest_level_meant), [&](const auto& level) {
+        return level.second.worst[number] > largest_error_meant(level.first);
+      });
+      ++number;
+      if (!too_far || sequence.extra_detail == 0 || sequence.extra_detail == most_extra_detail) continue;
+      sequence.extra_detail = std::min(sequence.extra_detail + step, most_extra_detail);
+      any = true;
+    }
+  }
+  return any;
+}
+
 }  // namespace
 
 double largest_error_meant(int level) {
@@ -95,7 +114,12 @@ std::vector<int> measured_levels(int levels) {
 void measure_levels(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton, int levels,
                     EncodedClip& clip) {
   MeasuredLevels measured = measure(decoder, original, skeleton, levels, clip);
-  if (give_detail(measured, clip)) measured = measure(decoder, original, skeleton, levels, clip);
+  constexpr int most_rounds = 4;
+  bool changed = give_detail(measured, clip);
+  for (int round = 0; changed && round < most_rounds; ++round) {
+    measured = measure(decoder, original, skeleton, levels, clip);
+    changed = round + 1 < most_rounds && raise_detail(measured, clip);
+  }
   clip.levels.clear();
   for (const auto& [level, of_level] : measured) clip.levels.push_back({level, of_level.error});
   clip.error = clip.levels.empty() ? measure_level(decoder, original, skeleton, clip, -1).error : clip.levels.back().error;

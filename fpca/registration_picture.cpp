@@ -20,12 +20,20 @@ constexpr std::array curve_colours{"#0072b2", "#d55e00", "#009e73"};  // told ap
 constexpr const char* ink = "#333333";
 constexpr const char* component_names = "wxyz";
 
-// The curve of a joint's rotation that moves most, and the next ones, of other joints.
-std::vector<int> most_moving(const ClipCurves& curves, std::size_t count) {
+// The curve of a joint's rotation that moves most within the sequences that can be laid over each other (all, where
+// there are no whole cycles), and the next ones, of other joints.
+std::vector<int> most_moving(const ClipCurves& curves, const std::vector<PicturedSequence>& sequences,
+                             std::size_t count) {
+  const bool cyclic = std::ranges::any_of(sequences, [](const PicturedSequence& s) { return s.cycles > 0; });
   std::vector<std::pair<double, int>> by_movement;
   for (Eigen::Index c = 3; c < curves.values.cols(); ++c) {
-    const Eigen::VectorXd curve = curves.values.col(c);
-    by_movement.emplace_back(-(curve.array() - curve.mean()).square().mean(), static_cast<int>(c));
+    double movement = 0;
+    for (const PicturedSequence& s : sequences) {
+      if (cyclic && s.cycles == 0) continue;
+      const Eigen::VectorXd part = curves.values.col(c).segment(s.first, s.last - s.first + 1);
+      movement += (part.array() - part.mean()).square().sum();
+    }
+    by_movement.emplace_back(-movement, static_cast<int>(c));
   }
   std::ranges::sort(by_movement);
   std::vector<int> out;
@@ -81,7 +89,7 @@ class RegistrationPicture {
  public:
   RegistrationPicture(const ClipCurves& curves, const Skeleton& skeleton,
                       const std::vector<PicturedSequence>& sequences)
-      : curves_(curves), skeleton_(skeleton), sequences_(sequences), svg_(wide, 640), shown_(most_moving(curves, 3)) {
+      : curves_(curves), skeleton_(skeleton), sequences_(sequences), svg_(wide, 640), shown_(most_moving(curves, sequences, 3)) {
     for (const PicturedSequence& s : sequences) {
       cycles_ += s.cycles;
       if (s.cycles > 0) cyclic_frames_ += s.last - s.first;
@@ -150,9 +158,9 @@ class RegistrationPicture {
     const Eigen::VectorXd values = curves_.values.col(curve);
     const Scale scale(values.minCoeff(), values.maxCoeff(), curves_top + 8, curves_height - 16);
     const int step = std::max(1, curves_.frames() / 2000);
-    for (int f = step; f < curves_.frames(); f += step) {
-      svg_.line({x_of(f - step), scale.y(values(f - step))}, {x_of(f), scale.y(values(f))}, colour, 1.4);
-    }
+    std::vector<Point> points;
+    for (int f = 0; f < curves_.frames(); f += step) points.emplace_back(x_of(f), scale.y(values(f)));
+    svg_.polyline(points, colour, 1.4);
   }
 
   void draw_overlays() {
@@ -183,10 +191,11 @@ class RegistrationPicture {
     svg_.rectangle({left, overlay_top}, {width, overlay_height}, "#f7f7f7");
     svg_.label({left, overlay_top - 10}, title, "start", 14, ink);
     for (const Eigen::VectorXd& s : stretches) {
-      for (int i = 1; i < overlay_points; ++i) {
-        const auto x = [&](int point) { return left + width * point / (overlay_points - 1); };
-        svg_.line({x(i - 1), scale.y(s(i - 1))}, {x(i), scale.y(s(i))}, curve_colours[0], 0.8);
+      std::vector<Point> points;
+      for (int i = 0; i < overlay_points; ++i) {
+        points.emplace_back(left + width * i / (overlay_points - 1), scale.y(s(i)));
       }
+      svg_.polyline(points, curve_colours[0], 0.8);
     }
     svg_.label({left, overlay_top + overlay_height + 20},
                fmt::format("{}, {:.3f} from their mean (rms)", curve_name(skeleton_, shown_.front()), spread(stretches)),

@@ -77,6 +77,18 @@ Svg::Svg(double width, double height) : text_("<svg xmlns=\"http://www.w3.org/20
   text_ += ">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n";
 }
 
+void Svg::polyline(const std::vector<Point>& points, std::string_view colour, double width) {
+  text_ += "<polyline points=\"";
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i > 0) text_ += ' ';
+    text_ += svg_number(points[i].x()) + ',' + svg_number(points[i].y());
+  }
+  text_ += "\" fill=\"none\"";
+  attribute(text_, "stroke", colour);
+  attribute(text_, "stroke-width", width);
+  text_ += " stroke-linejoin=\"round\"/>\n";
+}
+
 void Svg::line(const Point& a, const Point& b, std::string_view colour, double width) {
   text_ += "<line";
   attribute(text_, "x1", a.x());

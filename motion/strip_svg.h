@@ -5,6 +5,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -19,6 +20,7 @@ class Svg {
 
   Svg(double width, double height);  // white
   void line(const Point& a, const Point& b, std::string_view colour, double width);
+  void polyline(const std::vector<Point>& points, std::string_view colour, double width);
   void circle(const Point& middle, double radius, std::string_view fill, std::string_view stroke, double width);
   void rectangle(const Point& corner, const Point& size, std::string_view fill);
   // `anchor`: start, middle or end. What XML cannot hold (control characters, bytes that are not UTF-8) becomes '?'.
