@@ -70,12 +70,13 @@ TEST_F(RepeatsCommand, the_picture_is_an_svg_with_the_table_in_it) {
   EXPECT_NE(svg.find("data:image/png;base64,iVBORw0KGgo"), std::string::npos);
 }
 
-TEST_F(RepeatsCommand, clips_of_two_rates_several_files_without_repeats_and_lost_pictures_are_errors) {
+TEST_F(RepeatsCommand, clips_of_two_rates_several_files_without_repeats_and_pictures_over_their_clip_are_errors) {
   const CommandResult rates = run_command({"info", at("slow.bvh"), at("other_rate.bvh"), "--repeats"});
   EXPECT_EQ(rates.code, 1);
   EXPECT_NE(rates.err.find("other_rate.bvh"), std::string::npos);
   EXPECT_EQ(run_command({"info", at("slow.bvh"), at("fast.bvh")}).code, 2);
-  EXPECT_EQ(run_command({"info", at("slow.bvh"), "--picture", at("q.svg")}).code, 2);
+  EXPECT_EQ(run_command({"info", at("slow.bvh"), "--clip", "slow"}).code, 2) << "of a picture that is not asked for";
+  EXPECT_EQ(run_command({"info", at("slow.bvh"), "--picture", at("slow.bvh")}).code, 2);
   EXPECT_EQ(run_command({"info", at("slow.bvh"), "--repeats", "--picture", at("slow.bvh")}).code, 2);
 }
 
