@@ -230,6 +230,7 @@ class SpaceWriter {
     }
     out.clip.error =
         out.clip.levels.empty() ? measure_error(prepared, decoder_, out.clip, -1) : out.clip.levels.back().error;
+    out.clip.feet = keep_feet(clip_from_curves(prepared.curves, prepared.skeleton), prepared.curves.placement);
     out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
     return out;
