@@ -1,5 +1,6 @@
 // `kinespace bench playback`: what a full pose costs - the local rotations of all joints and the root's place - at
-// random times of random clips, with all coefficients in memory, on one core.
+// random times of random clips, with all coefficients in memory, on one core; and how feet stand at a level of detail,
+// as it is and planted.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -19,7 +20,7 @@
 #include "bench/report.h"
 #include "kinespace/library/library_builder.h"
 #include "kinespace/motion/read.h"
-#include "kinespace/synthesis/player.h"
+#include "kinespace/synthesis/planted_player.h"
 
 namespace kinespace {
 namespace {
@@ -30,7 +31,9 @@ constexpr int rounds = 100;  // the least counts: another program may be in the 
 struct Played {
   RegisteredSpace space;
   std::vector<EncodedClip> clips;
+  std::vector<Skeleton> skeletons;
   std::vector<Player> players;
+  std::vector<PlantedPlayer> planted;
 };
 
 Played load_played(const std::filesystem::path& folder) {
@@ -38,13 +41,17 @@ Played load_played(const std::filesystem::path& folder) {
   std::vector<PreparedClip> clips(files.size());
   tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = prepare(read_clip(files[i])); });
   BuiltSpace built = build_space(source_of(clips), {});
-  Played out{std::move(built.space), {}, {}};
+  Played out{std::move(built.space), {}, {}, {}, {}};
   const auto basis = std::make_shared<const PlaybackBasis>(out.space);
   for (std::size_t i = 0; i < clips.size(); ++i) {
     ClipCurves curves = clips[i].curves;
     out.space.apply_references(curves.values);
     out.clips.push_back(encode(out.space, curves, built.runs_of(static_cast<int>(i), clips[i].runs), built.warps[i]));
+    const Clip original = clip_from_curves(clips[i].curves, clips[i].skeleton);
+    out.clips.back().feet = keep_feet(original, clips[i].curves.placement);
+    out.skeletons.push_back(clips[i].skeleton);
     out.players.emplace_back(basis, out.clips.back());
+    out.planted.emplace_back(out.players.back(), out.clips.back(), out.skeletons.back());
   }
   return out;
 }
@@ -99,6 +106,56 @@ double difference_cm(const Played& played, int functions) {
   return largest;
 }
 
+// How the feet of a level of detail stand, over the clips whose feet are known.
+struct Standing {
+  double original = 0;  // cm/s, frames count alike
+  double unplanted = 0;
+  double planted = 0;
+  double most_over_bar = -1e9;  // of a clip's planted slide over 1.3 times the original's + 0.5 cm/s
+  double penetration = 0;       // cm, the deepest, planted
+};
+
+Standing standing_at(const Played& played, int functions) {
+  Standing out;
+  double frames = 0;
+  for (std::size_t i = 0; i < played.clips.size(); ++i) {
+    const EncodedClip& clip = played.clips[i];
+    if (!clip.feet) continue;
+    Clip decoded = clip_from_curves(decode(played.space, clip, functions), played.skeletons[i]);
+    const FeetMeasures before = measure_feet(decoded, *clip.feet, clip.placement);
+    plant_feet(decoded, *clip.feet, clip.placement);
+    const FeetMeasures after = measure_feet(decoded, *clip.feet, clip.placement);
+    frames += clip.frames;
+    out.original += clip.frames * clip.feet->slide_cm_s;
+    out.unplanted += clip.frames * before.slide_cm_s;
+    out.planted += clip.frames * after.slide_cm_s;
+    out.most_over_bar = std::max(out.most_over_bar, after.slide_cm_s - 1.3 * clip.feet->slide_cm_s - 0.5);
+    out.penetration = std::max(out.penetration, after.floor_penetration_cm);
+  }
+  for (double* sum : {&out.original, &out.unplanted, &out.planted}) *sum /= frames;
+  return out;
+}
+
+void add_standing(const std::string& data, const Played& played, BenchReport& report) {
+  const auto add = [&](const std::string& name, double value, const std::string& unit,
+                       std::optional<double> bar = std::nullopt) {
+    report.results.push_back({.name = name, .data = data, .value = value, .unit = unit, .bar = bar});
+  };
+  for (const int functions : {3, 5, 10, -1}) {
+    const Standing seen = standing_at(played, functions);
+    const bool judged = functions == 5;
+    const std::string at = functions < 0 ? std::string("all") : std::to_string(functions);
+    if (functions == 3) add("foot slide, original", seen.original, "cm/s");
+    add("foot slide at " + at + " functions", seen.unplanted, "cm/s");
+    add("foot slide at " + at + " functions, planted", seen.planted, "cm/s",
+        judged ? std::optional(1.3 * seen.original + 0.5) : std::nullopt);
+    add("worst clip over 1.3 x original + 0.5 at " + at + " functions, planted", seen.most_over_bar, "cm/s",
+        judged ? std::optional(0.0) : std::nullopt);
+    add("under the original's floor at " + at + " functions, planted", seen.penetration, "cm",
+        judged ? std::optional(0.5) : std::nullopt);
+  }
+}
+
 }  // namespace
 
 BenchReport bench_playback(const BenchOptions& options) {
@@ -120,6 +177,10 @@ BenchReport bench_playback(const BenchOptions& options) {
                       : fmt::format("a pose at {} functions", functions),
         cost, "us", functions == 5 ? std::optional(0.5) : std::nullopt);
   }
+  add("a pose at 5 functions, feet planted",
+      time_poses(moments, rotations,
+                 [&](const Moment& m) { return played.planted[m.player].pose(m.time_s, 5, rotations).x(); }),
+      "us", 1.0);
   // Times of one clip: what the computation takes without the wait for memory.
   std::vector<Moment> of_one = moments;
   for (Moment& m : of_one) m = {.player = 0, .time_s = std::fmod(m.time_s, played.players.front().duration_s())};
@@ -135,6 +196,12 @@ BenchReport bench_playback(const BenchOptions& options) {
   for (const int functions : {5, -1}) {
     add(fmt::format("root against decoding, {} functions", functions < 0 ? played.space.levels() : functions),
         difference_cm(played, functions), "cm", 0.01);
+  }
+  add_standing("cmu", played, report);
+  for (const char* folder : {"bandai1", "bandai2"}) {
+    if (std::filesystem::is_directory(options.data / folder)) {
+      add_standing(folder, load_played(options.data / folder), report);
+    }
   }
   return report;
 }

@@ -142,6 +142,7 @@ class LevelTable {
   std::map<int, Sum> levels_;
 };
 
+<<<<<<< HEAD
 int whole_cycles(const EncodedClip& clip) {
   int cycles = 0;
   for (const PicturedSequence& s : pictured(clip)) cycles += s.cycles;
@@ -165,6 +166,26 @@ void draw_library_clip(LibraryView& view, const InfoOptions& options) {
   write_file_atomically(*options.picture, registration_picture_svg(view.curves(row), view.skeleton(row.skeleton_id),
                                                                    pictured(view.encoded(row, 1))));
 }
+=======
+// What a library keeps of the feet of its clips.
+struct KeptFeetTotals {
+  std::int64_t clips = 0;
+  std::int64_t contacts = 0;
+  std::int64_t bytes = 0;
+  double frames = 0;
+  double slide = 0;  // cm/s times frames
+
+  void add(const ClipRow& clip, const std::optional<KeptFeet>& feet) {
+    if (!feet) return;
+    ++clips;
+    contacts += static_cast<std::int64_t>(feet->contacts.size());
+    bytes += static_cast<std::int64_t>(pack_feet(*feet).size());
+    frames += static_cast<double>(clip.frames);
+    slide += feet->slide_cm_s * static_cast<double>(clip.frames);
+  }
+  [[nodiscard]] Json mean_slide() const { return frames > 0 ? Json(slide / frames) : Json(); }
+};
+>>>>>>> td/main
 
 Json describe_library(const InfoOptions& options, Session& /*session*/) {
   LibraryView view(options.file);
@@ -185,14 +206,18 @@ Json describe_library(const InfoOptions& options, Session& /*session*/) {
     height = std::max(height, view.space(row.id).skeleton().rest_height());
   }
   LevelTable levels;
+  KeptFeetTotals feet;
   for (const ClipRow& row : library.clips()) {
     levels.add(row, view.level_errors(row));
+    const std::optional<KeptFeet> of_clip = view.feet(row);
+    feet.add(row, of_clip);
     rate = std::max(rate, row.rate_hz);
     const auto space = space_at.find(row.space_id);
     clips.push_back({{"name", row.name},
                      {"frames", row.frames},
                      {"rate_hz", row.rate_hz},
                      {"labels", row.labels},
+                     {"foot_slide_cm_s", of_clip ? Json(of_clip->slide_cm_s) : Json()},
                      {"space", space == space_at.end() ? Json() : Json(space->second)}});
     if (space == space_at.end()) continue;
     Json& clips_of_space = spaces[space->second]["clips"];
@@ -218,6 +243,10 @@ Json describe_library(const InfoOptions& options, Session& /*session*/) {
           {"retrieval_bytes", totals.retrieval_bytes},
           {"spaces", std::move(spaces)},
           {"levels", levels.rows()},
+          {"clips_with_feet", feet.clips},
+          {"foot_contacts", feet.contacts},
+          {"feet_bytes", feet.bytes},
+          {"foot_slide_cm_s", feet.mean_slide()},
           {"clip_list", std::move(clips)}};
 }
 

@@ -14,6 +14,7 @@
 
 #include <Eigen/Core>
 
+#include "kinespace/footskate/kept_feet.h"
 #include "kinespace/fpca/registered_space.h"
 #include "kinespace/fpca/sequences.h"
 #include "kinespace/fpca/warp.h"
@@ -59,6 +60,7 @@ struct EncodedClip {
   std::vector<EncodedRun> runs;
   MeasuredError error;             // of decoding with all functions, where it was measured
   std::vector<LevelError> levels;  // of some levels, ascending, where they were measured
+  std::optional<KeptFeet> feet;    // when and where feet stood, where that is known: encode() does not look for them
 
   [[nodiscard]] int sequence_count() const;
 };

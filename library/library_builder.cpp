@@ -192,6 +192,7 @@ class SpaceWriter {
                       built_.warps[static_cast<std::size_t>(index)], compute_);
     round_to_stored(out.clip, built_.space);
     measure_levels(decoder_, prepared.curves, prepared.skeleton, built_.space.levels(), out.clip);
+    out.clip.feet = keep_feet(clip_from_curves(prepared.curves, prepared.skeleton), prepared.curves.placement);
     out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
     return out;

@@ -11,6 +11,7 @@
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
 #include "kinespace/base/nearest_name.h"
+#include "kinespace/fpca/level_errors.h"
 #include "kinespace/library/detail/space_codec.h"
 #include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/kinematics.h"
@@ -33,17 +34,31 @@ double largest_distance(const JointPositions& a, const JointPositions& b) {
 }
 
 // `known`: how near all functions come.
-[[noreturn]] void refuse_level(const Library& library, const ClipRow& row, const std::string& known, double asked_cm) {
+[[noreturn]] void refuse_level(const Library& library, const std::string& clip, const std::string& known,
+                               double asked_cm) {
   const bool nothing = known == "nothing";
   throw Error(ErrorKind::usage,
               {.file = library.path().string(),
-               .found = fmt::format("a largest error of {:.3g} cm asked of the clip \"{}\"", asked_cm, row.name),
+               .found = fmt::format("a largest error of {:.3g} cm asked of the clip \"{}\"", asked_cm, clip),
                .expected = nothing ? "an error that can be promised: the library does not know how near its functions "
                                      "come to the clip as it was read, and the file it came from is not there unchanged"
                                    : fmt::format("at least {}: so near do all its functions come to the clip as it "
                                                  "was read",
                                                  known),
                .remedy = "ask for less with --lod, or build the library with more functions"});
+}
+
+// The fewest functions whose largest distance from `target`, and `unseen_cm` on top, is within the limit; nullopt: not
+// even all are. `error`: that of the last that was tried.
+std::optional<int> first_level_within(const RegisteredSpace& space, const EncodedClip& clip, const Skeleton& bones,
+                                      const JointPositions& target, double unseen_cm, double limit_cm, double& error) {
+  error = unseen_cm;
+  // The error falls with n but for small waves, so the first n that is good enough is looked for one by one.
+  for (int n = 0; n <= space.levels() && unseen_cm <= limit_cm; ++n) {
+    error = unseen_cm + largest_distance(target, joint_positions(clip_from_curves(decode(space, clip, n), bones)));
+    if (error <= limit_cm) return n;
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -130,9 +145,33 @@ EncodedClip LibraryView::encoded(const ClipRow& row, int functions) {
   return unpack_clip(packed, space(row.space_id), skeleton(row.skeleton_id), header, source, functions);
 }
 
+const RegisteredSpace& LibraryView::require_space_for(const Clip& clip, const std::filesystem::path& file) {
+  if (const std::optional<std::int64_t> id = space_for(clip.skeleton)) return space(*id);
+  throw Error(ErrorKind::bad_input, {.file = file.string(),
+                                     .found = "a skeleton that no clip of " + library_.path().string() + " has",
+                                     .expected = "the joint names, parents and channels of the library's clips",
+                                     .remedy = "`kinespace build --add --by-skeleton` gives it a space of its own"});
+}
+
+EncodedClip LibraryView::encode(const Clip& clip, const std::filesystem::path& file) {
+  const RegisteredSpace& of = require_space_for(clip, file);
+  EncodedClip out = encode_clip(of, clip);
+  round_to_stored(out, of);
+  ClipCurves curves = clip_curves(clip);
+  of.apply_references(curves.values);
+  measure_levels(ClipDecoder(of), curves, clip.skeleton, of.levels(), out);
+  out.feet = keep_feet(clip, out.placement);
+  return out;
+}
+
 std::vector<LevelError> LibraryView::level_errors(const ClipRow& row) {
   return unpack_level_errors(library_.clip_blob(row.id, ClipBlob::side), space(row.space_id),
                              fmt::format("{} (clip {})", library_.path().string(), row.name));
+}
+
+std::optional<KeptFeet> LibraryView::feet(const ClipRow& row) {
+  return unpack_clip_feet(library_.clip_blob(row.id, ClipBlob::side), static_cast<int>(row.frames),
+                          skeleton(row.skeleton_id), fmt::format("{} (clip {})", library_.path().string(), row.name));
 }
 
 ClipCurves LibraryView::curves(const ClipRow& row, int functions) {
@@ -166,22 +205,28 @@ LibraryView::LevelOfDetail LibraryView::level_for_error(const ClipRow& row, doub
     for (const LevelError& l : whole.levels) {
       if (l.error.max_joint_error_cm <= max_error_cm) return {l.level, l.error.max_joint_error_cm, false};
     }
-    refuse_level(library_, row, fmt::format("{:.3g} cm", whole.levels.back().error.max_joint_error_cm), max_error_cm);
+    refuse_level(library_, row.name, fmt::format("{:.3g} cm", whole.levels.back().error.max_joint_error_cm),
+                 max_error_cm);
   }
   const JointPositions target = joint_positions(source ? *source : clip_from_curves(decode(s, whole), bones));
   // The library keeps errors as 32-bit floats.
   const double unseen_cm = source ? 0 : whole.error.max_joint_error_cm * (1 + 1e-6);
-  if (!std::isfinite(unseen_cm)) refuse_level(library_, row, "nothing", max_error_cm);
-  const auto error_of = [&](int n) {
-    return unseen_cm + largest_distance(target, joint_positions(clip_from_curves(decode(s, whole, n), bones)));
-  };
-  // The error falls with n but for small waves, so the first n that is good enough is looked for one by one.
+  if (!std::isfinite(unseen_cm)) refuse_level(library_, row.name, "nothing", max_error_cm);
   double error = unseen_cm;
-  for (int n = 0; n <= s.levels() && unseen_cm <= max_error_cm; ++n) {
-    error = error_of(n);
-    if (error <= max_error_cm) return {n, error, source.has_value()};
+  if (const auto n = first_level_within(s, whole, bones, target, unseen_cm, max_error_cm, error)) {
+    return {*n, error, source.has_value()};
   }
-  refuse_level(library_, row, fmt::format("{:.3g} cm", error), max_error_cm);
+  refuse_level(library_, row.name, fmt::format("{:.3g} cm", error), max_error_cm);
+}
+
+LibraryView::LevelOfDetail LibraryView::level_for_error(const EncodedClip& encoded, const Clip& clip,
+                                                        double max_error_cm) {
+  double error = 0;
+  const RegisteredSpace& s = require_space_for(clip, clip.name);
+  if (const auto n = first_level_within(s, encoded, clip.skeleton, joint_positions(clip), 0, max_error_cm, error)) {
+    return {*n, error, true};
+  }
+  refuse_level(library_, clip.name, fmt::format("{:.3g} cm", error), max_error_cm);
 }
 
 void store_clip(Library& library, const ClipRow& row, const EncodedClip& clip, const RegisteredSpace& space,

@@ -43,9 +43,22 @@ class LibraryView {
   [[nodiscard]] ClipCurves curves(const ClipRow& row, int functions = -1);
   [[nodiscard]] Clip clip(const ClipRow& row, int functions = -1);
 
+  // A clip outside the library, encoded by the functions of its space as a build would and with its feet
+  // (footskate/kept_feet.h). Throws Error{bad_input} naming `file` when the library has no space for its skeleton.
+  [[nodiscard]] EncodedClip encode(const Clip& clip, const std::filesystem::path& file);
+  // The space that it is encoded in. Throws likewise.
+  [[nodiscard]] const RegisteredSpace& require_space_for(const Clip& clip, const std::filesystem::path& file);
+
+  // The clip as it was read, where the file that it came from is still there unchanged.
+  [[nodiscard]] std::optional<Clip> unchanged_source(const ClipRow& row) const;
+
   // How far the joints of a clip are from those that were read, of the levels of detail that were measured; its scores are
   // not looked at.
   [[nodiscard]] std::vector<LevelError> level_errors(const ClipRow& row);
+
+  // What the library keeps of the clip's feet; nullopt where nothing is planted, and in libraries of before feet were
+  // kept.
+  [[nodiscard]] std::optional<KeptFeet> feet(const ClipRow& row);
 
   // The fewest functions whose decoded clip is, at every joint and frame, within the given distance in cm of the clip
   // as it was read. Where the file it was read from is still there unchanged, that is measured; else the fewest of the
@@ -58,10 +71,10 @@ class LibraryView {
     bool from_the_file = false;  // measured against it
   };
   [[nodiscard]] LevelOfDetail level_for_error(const ClipRow& row, double max_error_cm);
+  // The same of a clip outside the library, as encode() encoded it.
+  [[nodiscard]] LevelOfDetail level_for_error(const EncodedClip& encoded, const Clip& clip, double max_error_cm);
 
  private:
-  [[nodiscard]] std::optional<Clip> unchanged_source(const ClipRow& row) const;
-
   Library library_;
   std::map<std::int64_t, RegisteredSpace> spaces_;
   std::map<std::int64_t, ClipSpace> clip_spaces_;

@@ -235,7 +235,7 @@ PlayerParts::Place PlayerParts::place_in(std::size_t index, double own) const {
   return {.sequence = index, .own = own, .cell = cell, .b = static_cast<float>(x - cell)};
 }
 
-PlayerParts::Place PlayerParts::place_at(double time_s) const {
+double PlayerParts::frame_at(double time_s) const {
   const double end = frames - 1;
   double x = time_s * rate_hz;
   if (!(x > 0 && x < end)) {
@@ -246,6 +246,11 @@ PlayerParts::Place PlayerParts::place_at(double time_s) const {
     }
     x = std::clamp(std::isnan(x) ? 0.0 : x, 0.0, end);
   }
+  return x;
+}
+
+PlayerParts::Place PlayerParts::place_at(double time_s) const {
+  const double x = frame_at(time_s);
   auto index = static_cast<std::size_t>(at[static_cast<std::size_t>(static_cast<int>(x) / bucket)]);
   while (index + 1 < sequences.size() && sequences[index + 1].first <= x) ++index;
   const Sequence& sequence = sequences[index];
@@ -287,6 +292,9 @@ double Player::duration_s() const {
 }
 int Player::joints() const {
   return parts_->joints;
+}
+double Player::frame_at(double time_s) const {
+  return parts_->frame_at(time_s);
 }
 int Player::functions() const {
   return parts_->basis->levels();

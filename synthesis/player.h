@@ -43,6 +43,8 @@ class Player {
   [[nodiscard]] double duration_s() const;
   [[nodiscard]] int joints() const;
   [[nodiscard]] int functions() const;
+  // The frame that is played at a time, between 0 and the last: with `loop` times beyond the ends start over.
+  [[nodiscard]] double frame_at(double time_s) const;
 
   // The pose at a time in seconds from the clip's first frame, at level of detail `functions` (all when < 0 or too
   // large). `rotations`: 4 * joints() floats, w x y z of each of Skeleton::rotating_joints() in its parent's frame,

@@ -482,6 +482,23 @@ std::vector<LevelError> unpack_level_errors(std::span<const std::byte> bytes, co
   return level_errors_of(side, space, source);
 }
 
+namespace {
+
+std::optional<KeptFeet> feet_of(const Bitstream& side, int frames, const Skeleton& skeleton,
+                                const std::string& source) {
+  if (!side.has_section("feet")) return std::nullopt;
+  return unpack_feet(side.section("feet"), frames, skeleton, source);
+}
+
+}  // namespace
+
+std::optional<KeptFeet> unpack_clip_feet(std::span<const std::byte> bytes, int frames, const Skeleton& skeleton,
+                                         const std::string& source) {
+  const Bitstream side = Bitstream::parse(bytes, source);
+  side.require_kind("clip-side");
+  return feet_of(side, frames, skeleton, source);
+}
+
 PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   PackedClip out;
   BitstreamWriter vectors("clip-vectors");
@@ -499,6 +516,7 @@ PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   BitstreamWriter side("clip-side");
   side.add_section("side", pack_side(clip));
   if (!clip.levels.empty()) side.add_section("levels", pack_levels(clip.levels));
+  if (clip.feet) side.add_section("feet", pack_feet(*clip.feet));
   out.side = side.finish();
   return out;
 }
@@ -531,6 +549,7 @@ EncodedClip unpack_clip(const PackedClip& packed, const RegisteredSpace& space, 
   side.require_kind("clip-side");
   unpack_side(ByteReader(side.section("side"), source), clip, skeleton, source);
   clip.levels = level_errors_of(side, space, source);
+  clip.feet = feet_of(side, clip.frames, skeleton, source);
 
   const Bitstream vectors = Bitstream::parse_prefix(packed.vectors, source);
   vectors.require_kind("clip-vectors");

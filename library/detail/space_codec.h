@@ -27,7 +27,7 @@ inline constexpr double score_step = 1e-4;  // over the root of a set's pace: mo
 struct PackedClip {
   Bytes vectors;  // the scores
   Bytes warps;    // where the sequences lie and how time runs in them
-  Bytes side;     // where the clip stands, what each sequence travels, side tracks
+  Bytes side;     // where the clip stands, what each sequence travels, side tracks, errors of levels, feet
 };
 [[nodiscard]] PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space);
 // What the clip is after pack_clip and unpack_clip: its scores are in the steps that they are stored in.
@@ -40,5 +40,9 @@ void round_to_stored(EncodedClip& clip, const RegisteredSpace& space);
 // What `side` says of a clip's levels of detail alone; empty where they were not measured.
 [[nodiscard]] std::vector<LevelError> unpack_level_errors(std::span<const std::byte> side, const RegisteredSpace& space,
                                                           const std::string& source);
+
+// What `side` keeps of a clip's feet alone.
+[[nodiscard]] std::optional<KeptFeet> unpack_clip_feet(std::span<const std::byte> side, int frames,
+                                                       const Skeleton& skeleton, const std::string& source);
 
 }  // namespace kinespace

@@ -77,6 +77,7 @@ struct PlayerParts {
     return sequence.warped ? PlaybackBasis::warp_terms : 1;
   }
 
+  [[nodiscard]] double frame_at(double time_s) const;
   [[nodiscard]] Place place_at(double time_s) const;
   [[nodiscard]] Place place_in(std::size_t sequence, double own) const;
   // Metres in the clip's frame to the world's cm; and the root's orientation (w x y z) to the world's.

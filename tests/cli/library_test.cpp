@@ -1,5 +1,6 @@
 // build, query, export and info as a user runs them, on the sample clips.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -11,7 +12,10 @@
 #include <nlohmann/json.hpp>
 
 #include "examples/sample_motions.h"
+#include "kinespace/base/file.h"
+#include "kinespace/library/library_view.h"
 #include "kinespace/motion/read.h"
+#include "kinespace/storage/library_build.h"
 #include "tests/cli/run_command.h"
 #include "tests/support/data.h"
 
@@ -147,6 +151,104 @@ TEST_F(LibraryCommands, export_keeps_to_an_error) {
   const CommandResult compared =
       run_command({"compare", (clips() / "run_fast_001.bvh").string(), out("near.bvh").string(), "--json"});
   EXPECT_LT(json::parse(compared.out)["max_joint_error_cm"], 3);
+}
+
+TEST_F(LibraryCommands, export_of_few_functions_keeps_the_feet) {
+  const auto exported = [&](std::vector<std::string> more) {
+    more.insert(more.begin(),
+                {"export", library().string(), "walk_fast_001", "-o", out("feet.bvh").string(), "--json"});
+    const CommandResult result = run_command(more);
+    EXPECT_EQ(result.code, 0) << result.err;
+    return json::parse(result.out);
+  };
+  const json few = exported({"--lod", "5"});
+  EXPECT_EQ(few["feet_planted"], true);
+  EXPECT_LE(few["foot_slide_cm_s"].get<double>(), 1.3 * few["foot_slide_original_cm_s"].get<double>() + 0.5);
+  EXPECT_GT(few["foot_slide_unplanted_cm_s"].get<double>(), few["foot_slide_cm_s"].get<double>());
+  EXPECT_LE(few["floor_penetration_cm"].get<double>(), 0.5);
+  EXPECT_EQ(few["root_errors_against"], "the clip as it was read");
+  EXPECT_LT(std::abs(few["root_height_drift_cm"].get<double>()), 0.1);
+  EXPECT_LT(std::abs(few["heading_drift_deg"].get<double>()), 0.1);
+  // What is said is so of the file.
+  const json compared = json::parse(
+      run_command({"compare", (clips() / "walk_fast_001.bvh").string(), out("feet.bvh").string(), "--json"}).out);
+  EXPECT_NEAR(compared["mean_joint_error_cm"].get<double>(), few["mean_joint_error_cm"].get<double>(), 1e-3);
+  EXPECT_NEAR(compared["foot_slide_cm_s"].get<double>(), few["foot_slide_cm_s"].get<double>(), 1e-2);
+  const json bare = exported({"--lod", "5", "--no-plant-feet"});
+  EXPECT_EQ(bare["feet_planted"], false);
+  EXPECT_EQ(bare["foot_slide_cm_s"], few["foot_slide_unplanted_cm_s"]);
+  EXPECT_EQ(exported({"--lod", "10"})["feet_planted"], false);
+  EXPECT_EQ(exported({"--lod", "10", "--plant-feet"})["feet_planted"], true);
+  EXPECT_EQ(exported({"--max-error", "20"})["feet_planted"], false);
+}
+
+TEST_F(LibraryCommands, export_plays_a_clip_that_is_not_in_the_library) {
+  write_clip(out("stranger.bvh"), make_walk({.speed_m_s = 1.1, .take = {.seed = 99}}).clip);
+  const auto before = hash_of_file(library());
+  const auto exported = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> line = {"export", library().string(),         "--clip", out("stranger.bvh").string(),
+                                     "-o",     out("played.bvh").string(), "--json"};
+    line.insert(line.end(), more.begin(), more.end());
+    return run_command(line);
+  };
+  const CommandResult result = exported({"--lod", "8"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  const json report = json::parse(result.out);
+  EXPECT_EQ(report["clip"], "stranger");
+  EXPECT_EQ(report["functions"], 8);
+  const json compared =
+      json::parse(run_command({"compare", out("stranger.bvh").string(), out("played.bvh").string(), "--json"}).out);
+  EXPECT_NEAR(compared["mean_joint_error_cm"].get<double>(), report["mean_joint_error_cm"].get<double>(), 1e-3);
+  EXPECT_NEAR(compared["max_joint_error_cm"].get<double>(), report["max_joint_error_cm"].get<double>(), 1e-2);
+  EXPECT_LT(report["mean_joint_error_cm"].get<double>(), 3);
+  EXPECT_LE(report["foot_slide_cm_s"].get<double>(), 1.3 * report["foot_slide_original_cm_s"].get<double>() + 0.5);
+  EXPECT_EQ(hash_of_file(library()), before);
+  const CommandResult near = exported({"--max-error", "5"});
+  ASSERT_EQ(near.code, 0) << near.err;
+  EXPECT_LE(json::parse(near.out)["max_joint_error_cm"].get<double>(), 5);
+
+  EXPECT_EQ(run_command({"export", library().string(), "-o", out("played.bvh").string()}).code, 2);
+  EXPECT_EQ(run_command({"export", library().string(), "walk_fast_001", "--clip", out("stranger.bvh").string(), "-o",
+                         out("played.bvh").string()})
+                .code,
+            2);
+  Clip other = make_clip("other", sample_skeleton(), 60, 30);
+  other.skeleton.joints.back().name = "other";
+  write_clip(out("other.bvh"), other);
+  const CommandResult refused = run_command(
+      {"export", library().string(), "--clip", out("other.bvh").string(), "-o", out("played.bvh").string()});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.err.find("other.bvh"), std::string::npos) << refused.err;
+}
+
+// What libraries were before feet were kept.
+void forget_feet(const std::filesystem::path& path) {
+  LibraryBuild build(path, {.fingerprint = "without feet", .extend = true});
+  LibraryView view(path);
+  for (const ClipRow& row : view.library().clips()) {
+    EncodedClip clip = view.encoded(row);
+    clip.feet.reset();
+    store_clip(build.library(), row, clip, view.space(row.space_id), view.library().retrieval_vector(row.id), true);
+  }
+  build.finish();
+}
+
+TEST_F(LibraryCommands, a_library_of_before_feet_were_kept_plays_without_planting) {
+  const std::filesystem::path old = out("of before.kspace");
+  std::filesystem::copy_file(library(), old);
+  forget_feet(old);
+  const CommandResult result =
+      run_command({"export", old.string(), "walk_fast_001", "-o", out("old.bvh").string(), "--lod", "5", "--json"});
+  ASSERT_EQ(result.code, 0) << result.err;
+  const json report = json::parse(result.out);
+  EXPECT_EQ(report["feet_planted"], false);
+  EXPECT_TRUE(report["foot_slide_cm_s"].is_null());
+  EXPECT_NE(result.err.find("build it again"), std::string::npos) << result.err;
+  const json info = json::parse(run_command({"info", old.string(), "--json"}).out);
+  EXPECT_EQ(info["clips_with_feet"], 0);
+  const json now = json::parse(run_command({"info", library().string(), "--json"}).out);
+  EXPECT_GT(now["clips_with_feet"], 10);
+  EXPECT_GT(now["foot_contacts"], now["clips_with_feet"]);
 }
 
 TEST_F(LibraryCommands, wrong_input_is_told_in_one_line) {
