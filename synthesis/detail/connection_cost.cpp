@@ -8,9 +8,9 @@
 namespace kinespace::connections {
 namespace {
 
-constexpr auto most_rows = static_cast<std::size_t>(2 * most_functions);
+constexpr auto most_form_rows = static_cast<std::size_t>(2 * most_functions);
 // Numbers at the points of an overlap, [row][point].
-using PointRows = std::array<double, most_rows * overlap_points>;
+using PointRows = std::array<double, most_form_rows * overlap_points>;
 
 // out = form in, for rows x rows numbers of a column-major form: along the points, so that it vectorises.
 KINESPACE_VECTOR_CLONES

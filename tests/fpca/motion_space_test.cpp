@@ -143,16 +143,16 @@ TEST(MotionSpace, every_grouping_gives_clips_back) {
   }
 }
 
-// What `build --smooth` makes of a noisy library: 2 degrees at every joint and 1 cm at the root.
+// What `build --smooth` makes of a noisy library: 2 degrees at every joint and half a millimetre at the root.
 TEST(MotionSpace, a_smoothed_space_gives_back_noisy_clips_nearer_to_the_truth) {
   std::mt19937_64 random(7);
   std::normal_distribution<double> normal;
   std::vector<PreparedClip> noisy;
   for (const PreparedClip& clip : prepared_samples()) {
     PreparedClip& copy = noisy.emplace_back(clip);
-    for (double& value : copy.curves.values.leftCols(3).reshaped()) value += 0.01 * normal(random);
-    for (double& value : copy.curves.values.rightCols(copy.curves.values.cols() - 3).reshaped()) {
-      value += 0.0175 * normal(random);
+    SampleMatrix& values = copy.curves.values;
+    for (Eigen::Index f = 0; f < values.rows(); ++f) {
+      for (Eigen::Index c = 0; c < values.cols(); ++c) values(f, c) += (c < 3 ? 0.0005 : 0.0175) * normal(random);
     }
   }
   SpaceBuildOptions options;
