@@ -105,7 +105,8 @@ void add_build(CLI::App& app, Session& session) {
   command->add_option("--grouping", options->grouping, "Which curves share functions: all, component or joint")
       ->check(CLI::IsMember({"all", "component", "joint"}))
       ->capture_default_str();
-  command->add_flag("--smooth", library.space.space.smooth, "Smooth mean and covariance and take noise off (PACE)");
+  command->add_flag("--smooth", library.space.space.smooth,
+                    "Smooth mean and covariance, and keep what scores are expected to be without the noise (PACE)");
   command
       ->add_option("--cycles", library.space.sequences.most_cycles,
                    "Most cycles of a walk or the like in a sequence (0: cut all motion at rests)")

@@ -142,7 +142,6 @@ class LevelTable {
   std::map<int, Sum> levels_;
 };
 
-<<<<<<< HEAD
 int whole_cycles(const EncodedClip& clip) {
   int cycles = 0;
   for (const PicturedSequence& s : pictured(clip)) cycles += s.cycles;
@@ -166,7 +165,7 @@ void draw_library_clip(LibraryView& view, const InfoOptions& options) {
   write_file_atomically(*options.picture, registration_picture_svg(view.curves(row), view.skeleton(row.skeleton_id),
                                                                    pictured(view.encoded(row, 1))));
 }
-=======
+
 // What a library keeps of the feet of its clips.
 struct KeptFeetTotals {
   std::int64_t clips = 0;
@@ -185,7 +184,6 @@ struct KeptFeetTotals {
   }
   [[nodiscard]] Json mean_slide() const { return frames > 0 ? Json(slide / frames) : Json(); }
 };
->>>>>>> td/main
 
 Json describe_library(const InfoOptions& options, Session& /*session*/) {
   LibraryView view(options.file);

@@ -15,9 +15,12 @@ find_package(PkgConfig REQUIRED)
 pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(LZMA REQUIRED IMPORTED_TARGET liblzma)
-find_package(ALGLIB REQUIRED)  # sets variables only
-add_library(kinespace_alglib INTERFACE)
-add_library(kinespace::alglib ALIAS kinespace_alglib)
-target_include_directories(kinespace_alglib SYSTEM INTERFACE ${ALGLIB_INCLUDE_DIRS})
-target_link_libraries(kinespace_alglib INTERFACE ${ALGLIB_LIB})
 find_package(BLAS REQUIRED)
+# Under the GPL. Nothing but kinespace::alglib links it, so without it that library is not made (alglib/licence.h).
+if(KINESPACE_ALGLIB)
+  find_package(ALGLIB REQUIRED)  # sets variables only
+  add_library(kinespace_alglib_itself INTERFACE)
+  add_library(kinespace::alglib_itself ALIAS kinespace_alglib_itself)
+  target_include_directories(kinespace_alglib_itself SYSTEM INTERFACE ${ALGLIB_INCLUDE_DIRS})
+  target_link_libraries(kinespace_alglib_itself INTERFACE ${ALGLIB_LIB})
+endif()

@@ -6,22 +6,30 @@ include(CMakePackageConfigHelpers)
 set(installed_modules ${KINESPACE_MODULES})
 list(REMOVE_ITEM installed_modules samples)
 
-# kinespace::kinespace: everything.
+# kinespace::kinespace: everything that is free of the GPL. kinespace::alglib, where it is built, is asked for by name
+# (licence.h).
 add_library(kinespace_all INTERFACE)
 add_library(kinespace::kinespace ALIAS kinespace_all)
 set_target_properties(kinespace_all PROPERTIES EXPORT_NAME kinespace)
-set_target_properties(kinespace_alglib PROPERTIES EXPORT_NAME alglib)
+set(free_modules ${installed_modules})
+list(REMOVE_ITEM free_modules alglib)
 
-set(installed_targets kinespace_all kinespace_alglib)
-foreach(module IN LISTS installed_modules)
+set(installed_targets kinespace_all)
+if(KINESPACE_ALGLIB)
+  set_target_properties(kinespace_alglib_itself PROPERTIES EXPORT_NAME alglib_itself)
+  list(APPEND installed_targets kinespace_alglib_itself)
+endif()
+foreach(module IN LISTS free_modules)
   target_link_libraries(kinespace_all INTERFACE kinespace_${module})
+endforeach()
+foreach(module IN LISTS installed_modules)
   list(APPEND installed_targets kinespace_${module})
   get_target_property(folder kinespace_${module} SOURCE_DIR)
   install(DIRECTORY ${folder} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/kinespace FILES_MATCHING PATTERN "*.h"
           PATTERN detail EXCLUDE                   # private to its folder
           REGEX "gltf/(tiny|arrays)\\.h$" EXCLUDE)  # of libraries that their users need not have
 endforeach()
-install(FILES include/kinespace.h ${KINESPACE_INCLUDE}/kinespace/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/kinespace)
+install(FILES include/kinespace.h ${KINESPACE_INCLUDE}/kinespace/version.h ${KINESPACE_INCLUDE}/kinespace/licence.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/kinespace)
 install(TARGETS kinespace_command RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ${installed_targets} EXPORT kinespaceTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 
@@ -33,13 +41,17 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/kinespaceConfig.cmake ${CMAKE_CURRENT_
         DESTINATION ${package_dir})
 
 # A static library stands before those it uses, so the arrows' order is turned round.
-set(pkgconfig_libs ${installed_modules})
+set(pkgconfig_libs ${free_modules})
 list(REVERSE pkgconfig_libs)
 list(TRANSFORM pkgconfig_libs PREPEND -lkinespace_)
 list(JOIN pkgconfig_libs " " pkgconfig_libs)
 file(RELATIVE_PATH pkgconfig_up /${CMAKE_INSTALL_LIBDIR} /)
 configure_file(cmake/kinespace.pc.in kinespace.pc @ONLY)
 install(FILES ${CMAKE_CURRENT_BINARY_DIR}/kinespace.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+if(KINESPACE_ALGLIB)
+  configure_file(cmake/kinespace-alglib.pc.in kinespace-alglib.pc @ONLY)
+  install(FILES ${CMAKE_CURRENT_BINARY_DIR}/kinespace-alglib.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+endif()
 
 install(FILES README.md CHANGELOG.md CONTRIBUTING.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)

@@ -39,6 +39,11 @@ endif()
 set(KINESPACE_INCLUDE ${PROJECT_BINARY_DIR}/include)
 file(MAKE_DIRECTORY ${KINESPACE_INCLUDE}/kinespace)
 configure_file(${PROJECT_SOURCE_DIR}/include/version.h.in ${KINESPACE_INCLUDE}/kinespace/version.h @ONLY)
+set(KINESPACE_HAS_ALGLIB 0)
+if(KINESPACE_ALGLIB)
+  set(KINESPACE_HAS_ALGLIB 1)
+endif()
+configure_file(${PROJECT_SOURCE_DIR}/include/licence.h.in ${KINESPACE_INCLUDE}/kinespace/licence.h @ONLY)
 file(CREATE_LINK ${PROJECT_SOURCE_DIR}/include/kinespace.h ${KINESPACE_INCLUDE}/kinespace/kinespace.h SYMBOLIC)
 
 # kinespace_folder_sources(OUT): the .cpp files of the current folder and of those below it, in the order of their names.

@@ -60,6 +60,7 @@ ScoreMatrix scores_of(const RegisteredSpace& space, const SampleMatrix& values, 
   const int last = sequence.last - sequence.first;
   SampleMatrix samples = sampler.sample(sequence.first, sequence.last, sequence.warp, set.points());
   ScoreMatrix best = set.scores(samples, compute);
+  if (set.options().smooth) return best;  // what it misses is noise
   double least = std::numeric_limits<double>::infinity();
   for (int round = 0; round < most_rounds && last > 1; ++round) {
     sequence.scores = round == 0 ? best : set.scores(samples, compute);

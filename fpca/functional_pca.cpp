@@ -10,8 +10,8 @@
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/conditional_scores.h"
 #include "kinespace/fpca/detail/blas.h"
-#include "kinespace/fpca/detail/spline.h"
 #include "kinespace/fpca/symmetric_eigen.h"
+#include "kinespace/numerics/spline.h"
 
 namespace kinespace {
 namespace {
@@ -243,6 +243,11 @@ void FunctionalPcaWorkspace::Parts::find_mean(const CurveMoments& moments, Funct
     const Eigen::VectorXd& m = moments.mean();
     out.observed_mean = to_eigen(local_linear_line({m.data(), static_cast<std::size_t>(m.size())}, {}, options.kernel,
                                                    options.mean_bandwidth, places));
+  } else if (options.mean == MeanEstimate::spline) {
+    const Eigen::VectorXd& m = moments.mean();
+    const double noise = std::max(second_difference_noise(moments), 0.0) / static_cast<double>(moments.count());
+    out.observed_mean =
+        to_eigen(smoothing_spline_for_noise(places, {m.data(), static_cast<std::size_t>(m.size())}, noise).values);
   }
   out.mean = out.observed_mean;
   if (work_points != points) {
@@ -256,7 +261,7 @@ void FunctionalPcaWorkspace::Parts::find_covariance(const CurveMoments& moments,
   if (options.smooth_covariance) {
     moments.covariance(n, raw);
     const Eigen::VectorXd off = moments.mean() - out.observed_mean;
-    if (options.mean == MeanEstimate::smooth) raw += off * off.transpose();
+    if (options.mean != MeanEstimate::cross_sectional) raw += off * off.transpose();
     surface->smooth(raw, out.covariance);
     if (options.estimate_noise) find_noise(out);
     return;

@@ -46,6 +46,8 @@ enum class FpcaMode : std::uint8_t { consistent, pace };
 enum class MeanEstimate : std::uint8_t {
   cross_sectional,  // the mean of the curves at each point
   smooth,           // a local linear fit of that
+  spline,  // the smoothing spline through that which leaves as much as its noise: that of the curves by their second
+           // differences, over their number (numerics/spline.h); of clean or of many curves it is their mean
 };
 enum class ScoreKind : std::uint8_t {
   integration,  // integral of (y - mu) phi: exact on the span of the functions

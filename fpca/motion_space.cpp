@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/fpca/conditional_scores.h"
 #include "kinespace/kernels/covariance.h"
 #include "kinespace/kernels/projection.h"
 
@@ -24,7 +25,8 @@ FpcaOptions fpca_options(const MotionSpaceOptions& options) {
   out.variance_share = 1 - left_by_functions * (1 - options.variance_share);
   out.count = options.functions;
   if (options.smooth) {
-    out.mean = MeanEstimate::smooth;
+    out.variance_share = options.variance_share;  // beyond it there is noise
+    out.mean = MeanEstimate::spline;
     out.smooth_covariance = true;
     out.estimate_noise = true;
   }
@@ -210,6 +212,7 @@ void MotionSpace::fit(std::vector<CurveMoments> moments) {
       const double variance = pca.all_eigenvalues.cwiseMax(0).sum();
       const double left = variance - pca.eigenvalues.sum();
       groups_.push_back({pca.observed_mean, pca.observed_functions, pca.eigenvalues, variance, left});
+      if (pca.noise_variance) groups_.back().expect_scores(*pca.noise_variance);
     }
   }
   moments_ = std::move(moments);
@@ -229,7 +232,17 @@ FunctionGroup MotionSpace::fit_pinned(const CurveMoments& moments) const {
   return {pca.observed_mean, pca.observed_functions, pca.eigenvalues, variance, left};
 }
 
+void FunctionGroup::expect_scores(double noise_variance) {
+  noise = noise_variance;
+  conditional = ConditionalScores(functions, eigenvalues, static_cast<int>(eigenvalues.size())).projection(*noise);
+}
+
 ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& compute) const {
+  return scores_by(ScoreKind::conditional, samples, compute);
+}
+
+// Conditional ones where the space has them.
+ScoreMatrix MotionSpace::scores_by(ScoreKind kind, const SampleMatrix& samples, const Compute& compute) const {
   assert(samples.rows() == points_ && samples.cols() == curves());
   ScoreMatrix out = ScoreMatrix::Zero(rows(), curves());
   SampleMatrix above;  // what functions describe, where it is not the samples themselves
@@ -242,7 +255,9 @@ ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& comp
   auto of_functions = out.bottomRows(functions());
   if (groups_.size() == 1) {
     const FunctionGroup& g = groups_.front();
-    const Eigen::MatrixXd projector = (g.functions.array().colwise() * weights_.array()).matrix();
+    const bool expected = g.noise && kind == ScoreKind::conditional;
+    Eigen::MatrixXd projector = (g.functions.array().colwise() * weights_.array()).matrix();
+    if (expected) projector = g.conditional.transpose();
     const double flops = 2.0 * static_cast<double>(projector.size()) * curves();
     if (compute.device_for(KernelFamily::projection, flops) != nullptr) {
       const RowMatrix<float> curve_rows = curves_of.transpose().cast<float>();
@@ -256,14 +271,20 @@ ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& comp
   }
   for (int c = 0; c < curves(); ++c) {
     const FunctionGroup& g = groups_[static_cast<std::size_t>(group_of(c))];
-    const Eigen::VectorXd weighted = (curves_of.col(c) - g.mean).cwiseProduct(weights_);
-    of_functions.col(c).head(g.functions.cols()) = (g.functions.transpose() * weighted).cast<float>();
+    const Eigen::VectorXd centred = curves_of.col(c) - g.mean;
+    const bool expected = g.noise && kind == ScoreKind::conditional;
+    auto out_of_curve = of_functions.col(c).head(g.functions.cols());
+    if (expected) {
+      out_of_curve = (g.conditional * centred).cast<float>();
+    } else {
+      out_of_curve = (g.functions.transpose() * centred.cwiseProduct(weights_)).cast<float>();
+    }
   }
   return out;
 }
 
 void MotionSpace::drop_needless(ScoreMatrix& scores) const {
-  if (options_.functions) return;
+  if (options_.functions || options_.smooth) return;
   const int ends = options_.pinned ? 2 : 0;
   double variance = 0;  // of all curves of a sequence
   for (int c = 0; c < curves(); ++c) variance += groups_[static_cast<std::size_t>(group_of(c))].variance;
@@ -304,7 +325,8 @@ SampleMatrix MotionSpace::samples(const ScoreMatrix& scores, int n) const {
 
 ScoreMatrix MotionSpace::transfer(const ScoreMatrix& scores, const MotionSpace& from) const {
   assert(from.points_ == points_ && from.curves() == curves());
-  return this->scores(from.samples(scores));
+  // What was reconstructed holds no noise any more: integrals say it exactly.
+  return scores_by(ScoreKind::integration, from.samples(scores), {});
 }
 
 Eigen::VectorXd MotionSpace::truncation_error(const ScoreMatrix& scores, int n) const {

@@ -15,7 +15,13 @@
 //
 //   f_c(s) = (1 - s) f_c(0) + s f_c(1) + mu_g(s) + sum_k  x_kc phi_gk(s),      mu_g, phi_gk = 0 at both ends
 //
-// Its vectors have the two ends as rows 0 and 1. Level of detail n takes n numbers a curve, in a pinned space an end and
+// In a smoothed space (PACE: Yao, Mueller, Wang 2005) mean and covariance are smooth, the variance sigma^2 of white
+// noise in the curves is taken off the covariance, and x_kc is what it is expected to be, given the noisy curve: with
+// Phi = [phi_gk(s_i)] and Lambda the eigenvalues,
+//
+//   x_c = Lambda Phi' (Phi Lambda Phi' + sigma^2 I)^-1 (f_c - mu_g)
+//
+// A pinned space's vectors have the two ends as rows 0 and 1. Level of detail n takes n numbers a curve, in a pinned space an end and
 // the first n - 1 functions; n times `pace` where sequences last so many times as long.
 #pragma once
 
@@ -48,10 +54,10 @@ struct MotionSpaceOptions {
   double variance_share = 0.999999;  // of the curves' variance that every sequence keeps, in (0, 1]; functions cover it
                                      // so that a tenth as much is left, for the sequences that need them ...
   std::optional<int> functions;      // ... or a count, 1 .. T
-  bool smooth = false;  // smooth mean and covariance and take the noise off (PACE); clean motion needs none
-  bool pinned = false;  // the ends of sequences are kept apart
-  int cycles = 0;       // whole cycles that a sequence holds, 0 .. 8; 0: it was cut at rests
-  double pace = 1;      // numbers a curve that one more level of detail takes, 1 .. 100
+  bool smooth = false;               // smooth mean and covariance, expected scores (PACE); clean motion needs none
+  bool pinned = false;               // the ends of sequences are kept apart
+  int cycles = 0;                    // whole cycles that a sequence holds, 0 .. 8; 0: it was cut at rests
+  double pace = 1;                   // numbers a curve that one more level of detail takes, 1 .. 100
 
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;
@@ -73,6 +79,12 @@ struct FunctionGroup {
   Eigen::VectorXd eigenvalues;  // K, descending
   double variance = 0;          // of the curves about their common mean
   double left = 0;              // of it, what ends and functions do not reach
+  // Of a smoothed space: sigma^2, and what turns curves less the mean into expected scores, K x T.
+  std::optional<double> noise;
+  Eigen::MatrixXd conditional;
+
+  // Scores are conditional expectations from now on; `noise_variance` >= 0. The functions must be there.
+  void expect_scores(double noise_variance);
 };
 
 class MotionSpace {
@@ -98,11 +110,12 @@ class MotionSpace {
   // Finds the functions; none where there are no curves. The moments stay with the space, so that it can be extended.
   void fit(std::vector<CurveMoments> moments);
 
-  // T x C samples to scores (rows() x C) and back, at level of detail n (all when n < 0 or too large).
+  // T x C samples to scores (rows() x C) and back, at level of detail n (all when n < 0 or too large). Scores of a
+  // smoothed space are expected ones: `samples` of them are the curves less their noise.
   [[nodiscard]] ScoreMatrix scores(const SampleMatrix& samples, const Compute& compute = {}) const;
   [[nodiscard]] SampleMatrix samples(const ScoreMatrix& scores, int n = -1) const;
   // Sets to 0 the last functions' scores of a sequence, as many as together hold no more than half of (1 -
-  // variance_share) of the variance; none where a count of functions was asked for.
+  // variance_share) of the variance; none where a count of functions was asked for, and in a smoothed space.
   void drop_needless(ScoreMatrix& scores) const;
   // Scores in this space of what the scores were in another one of the same grid and curves (after it was extended).
   [[nodiscard]] ScoreMatrix transfer(const ScoreMatrix& scores, const MotionSpace& from) const;
@@ -131,6 +144,7 @@ class MotionSpace {
 
  private:
   [[nodiscard]] FunctionGroup fit_pinned(const CurveMoments& moments) const;
+  [[nodiscard]] ScoreMatrix scores_by(ScoreKind kind, const SampleMatrix& samples, const Compute& compute) const;
   void add_ends(const ScoreMatrix& scores, SampleMatrix& samples) const;
 
   friend Bytes pack_space(const MotionSpace& space);

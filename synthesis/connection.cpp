@@ -12,8 +12,8 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/alignment.h"
-#include "kinespace/motion/simd.h"
-#include "kinespace/synthesis/detail/connection.h"
+#include "kinespace/synthesis/detail/connection_cost.h"
+#include "kinespace/synthesis/detail/connection_refinement.h"
 
 namespace kinespace {
 using namespace connections;
@@ -24,14 +24,11 @@ constexpr int fine_points = 1025;
 constexpr int function_points = 129;
 constexpr int points_per_cell = 4;
 constexpr int stretch_points = bound_cells * points_per_cell + 1;  // a stretch is scored at so many points
-constexpr int overlap_points = 32;                                 // of the integral over an overlap
 constexpr double least_overlap = 0.1;                              // |S| that is tabulated
-constexpr int scales_per_octave = 4, octaves = 3;                  // u from 1/8 to 8
-constexpr double shift_steps = 40;                                 // per unit of the faster clock
-constexpr int minima_refined = 5;
+constexpr int scales_per_octave = 4;
+constexpr double shift_steps = 40;  // per unit of the faster clock
+constexpr int minima_refined = 8;
 constexpr double worth_refining = 2;  // cells that cost so many times the best are left
-constexpr int refinements = 6;
-constexpr int most_functions = 64;
 
 // From the points of a set to those of the `number`-th of `stretches` equal stretches of its time, by straight lines.
 Eigen::MatrixXd cut_out(Eigen::Index from, Eigen::Index to, int number, int stretches) {
@@ -99,26 +96,6 @@ SampleMatrix orthonormal_functions(const RegisteredSpace& space, int count) {
   return root.cwiseInverse().asDiagonal() * q;
 }
 
-// K functions at the points of an overlap, [function][point].
-using PointFunctions = std::array<float, static_cast<std::size_t>(most_functions) * overlap_points>;
-
-// sum over points of a' S b, S column-major: along the points, so that it vectorises.
-KINESPACE_VECTOR_CLONES
-float form_sum(const float* form, const float* a, const float* b, Eigen::Index count) {
-  float total[overlap_points] = {};
-  for (Eigen::Index c = 0; c < count; ++c) {
-    float product[overlap_points] = {};
-    for (Eigen::Index r = 0; r < count; ++r) {
-      const float factor = form[c * count + r];
-      for (int p = 0; p < overlap_points; ++p) product[p] += factor * a[r * overlap_points + p];
-    }
-    for (int p = 0; p < overlap_points; ++p) total[p] += product[p] * b[c * overlap_points + p];
-  }
-  float sum = 0;
-  for (const float at_point : total) sum += at_point;
-  return sum;
-}
-
 // Metres per unit of each invariant curve.
 Eigen::RowVectorXd invariant_weights(const Skeleton& skeleton) {
   const Eigen::RowVectorXd weights = curve_weights(skeleton);
@@ -168,17 +145,6 @@ void ConnectionOptions::validate() const {
     fail(fmt::format("functions = {}", functions), fmt::format("from 4 to {}", most_functions));
 }
 
-// The forms in the scores that E is made of, apart for rates and the rest.
-struct ConnectionSpace::Forms {
-  const ConnectionMotion* first;
-  const ConnectionMotion* second;
-  Eigen::MatrixXf cross_rates, cross_rest, own_of_second;
-
-  [[nodiscard]] double speed(double u) const { return speed_of(*first, *second, u); }
-  [[nodiscard]] Eigen::MatrixXf own_of_first(float speed) const { return speed * speed * first->rates + first->rest; }
-  [[nodiscard]] Eigen::MatrixXf cross(float speed) const { return speed * cross_rates + cross_rest; }
-};
-
 ConnectionSpace::ConnectionSpace(const RegisteredSpace& space, const ConnectionOptions& options)
     : ConnectionSpace(space, orthonormal_functions(space, options.functions), options) {}
 
@@ -199,10 +165,12 @@ void ConnectionSpace::tabulate() {
     spline.value(i * static_cast<double>(functions_.rows() - 1) / (fine_points - 1), fine.row(i));
   }
   fine_ = fine.cast<float>();
+  curves_ = std::make_shared<const FunctionCurves>(functions_);
 
   const Eigen::Index packed = count * (count + 1) / 2;
   Eigen::MatrixXf of_first(count, overlap_points), of_second(count, overlap_points);
-  for (int k = -octaves * scales_per_octave; k <= octaves * scales_per_octave; ++k) {
+  const int most = static_cast<int>(scale_octaves) * scales_per_octave;
+  for (int k = -most; k <= most; ++k) {
     Cells cells{.u = std::exp2(static_cast<double>(k) / scales_per_octave)};
     const Interval range = shifts_for(cells.u, least_overlap * std::max(1.0, 1 / cells.u));
     const double step = std::max(1.0, cells.u) / shift_steps;
@@ -262,8 +230,8 @@ ConnectionMotion ConnectionSpace::stretch_of(const CurveSampler& clip, double st
   ConnectionMotion out{.start_s = start_s, .length_s = length_s, .scores = scores.cast<float>()};
   const SampleMatrix curves = functions * scores;
   add_poses(curves.rightCols(weights_.size() - InvariantPose::rates), out);
-  const auto rates = out.scores.leftCols(InvariantPose::rates);
-  const auto rest = out.scores.rightCols(weights_.size() - InvariantPose::rates);
+  const Eigen::MatrixXd rates = out.scores.leftCols(InvariantPose::rates).cast<double>();
+  const Eigen::MatrixXd rest = out.scores.rightCols(weights_.size() - InvariantPose::rates).cast<double>();
   out.rates = rates * rates.transpose();
   out.rest = rest * rest.transpose();
   return out;
@@ -280,172 +248,98 @@ ConnectionMotion ConnectionSpace::start_of(const ClipCurves& clip) const {
   return stretch_of(sampler, 0, std::min(options_.window_s, sampler.duration_s() / 2));
 }
 
-ConnectionSpace::Forms ConnectionSpace::forms(const ConnectionMotion& first, const ConnectionMotion& second) const {
-  const Eigen::Index rest = weights_.size() - InvariantPose::rates;
-  return {.first = &first,
-          .second = &second,
-          .cross_rates =
-              first.scores.leftCols(InvariantPose::rates) * second.scores.leftCols(InvariantPose::rates).transpose(),
-          .cross_rest = first.scores.rightCols(rest) * second.scores.rightCols(rest).transpose(),
-          .own_of_second = second.rates + second.rest};
-}
-
-double ConnectionSpace::evaluate(const Forms& forms, double u, double v) const {
-  const Interval s = overlap_of(u, v);
-  const Eigen::Index count = functions_.cols();
-  PointFunctions of_first{}, of_second{};
-  for (int p = 0; p < overlap_points; ++p) {
-    const double at = s.begin + s.length() * (p + 0.5) / overlap_points;
-    interpolate(u * at + v, of_first.data() + p, overlap_points);
-    interpolate(at, of_second.data() + p, overlap_points);
-  }
-  const auto speed = static_cast<float>(forms.speed(u));
-  const Eigen::MatrixXf own_of_first = forms.own_of_first(speed), cross = forms.cross(speed);
-  const float sum = form_sum(own_of_first.data(), of_first.data(), of_first.data(), count) -
-                    2 * form_sum(cross.data(), of_first.data(), of_second.data(), count) +
-                    form_sum(forms.own_of_second.data(), of_second.data(), of_second.data(), count);
-  return std::max(0.0, static_cast<double>(sum) / overlap_points);
-}
-
 double ConnectionSpace::cost(const ConnectionMotion& first, const ConnectionMotion& second, double u, double v,
                              double shortest_s) const {
   constexpr double rounding = 1e-9;
   const double shortest = shortest_s > 0 ? shortest_s : options_.shortest_s;
   if (!(u > 0) || !legal_speed(speed_of(first, second, u))) return infinite;
   if (overlap_of(u, v).length() < least_overlap_of(first, second, u, shortest) - rounding) return infinite;
-  return evaluate(forms(first, second), u, v);
+  return PairCost(*curves_, first, second)(u, v);
 }
-
-// The legal range of a pair, and where in it one is: the scale by its logarithm, the shift by its share of what is
-// legal at that scale, so that the range is a box.
-struct ConnectionSpace::LegalRange {
-  const ConnectionMotion* first;
-  const ConnectionMotion* second;
-  double shortest_s;
-
-  struct Point {
-    double log_u = 0;
-    double share = 0;
-  };
-  // log u at which both motions play at the same speed.
-  [[nodiscard]] double even() const { return std::log2(second->length_s / first->length_s); }
-  [[nodiscard]] Interval scales() const {
-    constexpr double limit = octaves;
-    return {std::max(even() - 1, -limit), std::min(even() + 1, limit)};
-  }
-  [[nodiscard]] Interval shifts(double log_u) const {
-    const double u = std::exp2(log_u);
-    return shifts_for(u, least_overlap_of(*first, *second, u, shortest_s));
-  }
-  [[nodiscard]] double shift(const Point& point) const {
-    const Interval legal = shifts(point.log_u);
-    return legal.begin + point.share * legal.length();
-  }
-  [[nodiscard]] bool legal(double log_u) const {
-    const Interval shifts_there = shifts(log_u);
-    return shifts_there.begin <= shifts_there.end;
-  }
-};
 
 struct ConnectionSpace::Minimum {
   double cost = 0;
-  LegalRange::Point at;
+  double log_u = 0, v = 0;
+  double share = 0;  // of the way over the legal shifts
 };
 
 // The minima of the table along the shift, for every legal scale, lowest first.
-std::vector<ConnectionSpace::Minimum> ConnectionSpace::minima_of_table(const Forms& parts,
+std::vector<ConnectionSpace::Minimum> ConnectionSpace::minima_of_table(const PairCost& cost,
                                                                        const LegalRange& range) const {
   const Interval scales = range.scales();
   const auto count = functions_.cols();
+  const Eigen::MatrixXd second_own = range.second->rates + range.second->rest;
   std::vector<Minimum> minima;
   Eigen::VectorXf form(count * (count + 1) + count * count), costs;
   for (const Cells& cells : table_) {
     const double log_u = std::log2(cells.u);
-    if (log_u < scales.begin - 1e-9 || log_u > scales.end + 1e-9 || !range.legal(log_u)) continue;
+    if (log_u < scales.begin - 1e-9 || log_u > scales.end + 1e-9) continue;
     const Interval legal = range.shifts(log_u);
     const auto begin = std::ranges::lower_bound(cells.shifts, legal.begin) - cells.shifts.begin();
     const auto end = std::ranges::upper_bound(cells.shifts, legal.end) - cells.shifts.begin();
-    if (begin == end) minima.push_back({infinite, {log_u, 0.5}});  // a range between two cells
+    const double middle = (legal.begin + legal.end) / 2;
+    if (begin == end) minima.push_back({infinite, log_u, middle, 0.5});  // a range between two cells
 
-    const auto speed = static_cast<float>(parts.speed(cells.u));
-    const Eigen::MatrixXf first_own = parts.own_of_first(speed), cross = parts.cross(speed);
+    const double speed = speed_of(*range.first, *range.second, cells.u);
+    const Eigen::MatrixXd first_own = speed * speed * range.first->rates + range.first->rest;
     Eigen::Index at = 0;
-    for (const auto* own : {&first_own, &parts.own_of_second}) {
-      for (Eigen::Index c = 0; c < count; ++c, at += c) form.segment(at, c + 1) = own->col(c).head(c + 1);
+    for (const auto* own : {&first_own, &second_own}) {
+      for (Eigen::Index c = 0; c < count; ++c, at += c) {
+        form.segment(at, c + 1) = own->col(c).head(c + 1).cast<float>();
+      }
     }
-    form.tail(count * count) = cross.reshaped();
+    const Eigen::MatrixXd cross = speed * cost.cross_rates() + cost.cross_rest();
+    form.tail(count * count) = cross.reshaped().cast<float>();
     costs = cells.grams.middleRows(begin, end - begin) * form;
     for (Eigen::Index i = 0; i < costs.size(); ++i) {
       const bool lowest = (i == 0 || costs(i) <= costs(i - 1)) && (i + 1 == costs.size() || costs(i) <= costs(i + 1));
       if (!lowest) continue;
-      const double share =
-          (cells.shifts[static_cast<std::size_t>(begin + i)] - legal.begin) / std::max(legal.length(), 1e-12);
-      minima.push_back({costs(i), {log_u, std::clamp(share, 0.0, 1.0)}});
+      const double v = cells.shifts[static_cast<std::size_t>(begin + i)];
+      const double share = (v - legal.begin) / std::max(legal.length(), 1e-12);
+      minima.push_back({costs(i), log_u, v, std::clamp(share, 0.0, 1.0)});
     }
   }
   if (minima.empty()) {  // a range of scales between two of the table
-    const double log_u = std::clamp(range.even(), scales.begin, scales.end);
-    if (scales.begin <= scales.end && range.legal(log_u)) minima.push_back({infinite, {log_u, 0.5}});
+    if (scales.begin <= scales.end) {
+      const double log_u = std::clamp(range.even(), scales.begin, scales.end);
+      const Interval legal = range.shifts(log_u);
+      minima.push_back({infinite, log_u, (legal.begin + legal.end) / 2, 0.5});
+    }
   }
   std::ranges::stable_sort(minima, {}, &Minimum::cost);
   return minima;
 }
 
-// Descent along the two coordinates of the box, with steps that halve.
-ConnectionSpace::Minimum ConnectionSpace::descend(const Forms& parts, const LegalRange& range,
-                                                  const Minimum& start) const {
-  constexpr std::array<std::array<double, 2>, 4> directions{{{0, 1}, {0, -1}, {1, 0}, {-1, 0}}};
-  constexpr int tries = 4;
-  const Interval scales = range.scales();
-  const auto value_at = [&](const LegalRange::Point& point) {
-    return range.legal(point.log_u) ? evaluate(parts, std::exp2(point.log_u), range.shift(point)) : infinite;
-  };
-  Minimum here{value_at(start.at), start.at};
-  double scale_step = 0.5 / scales_per_octave, share_step = 0.5 / shift_steps;
-  for (int round = 0; round < refinements; ++round, scale_step /= 2, share_step /= 2) {
-    bool moved = true;
-    for (int i = 0; moved && i < tries; ++i) {
-      moved = false;
-      for (const auto& [du, dv] : directions) {
-        const LegalRange::Point next{std::clamp(here.at.log_u + du * scale_step, scales.begin, scales.end),
-                                     std::clamp(here.at.share + dv * share_step, 0.0, 1.0)};
-        if (next.log_u == here.at.log_u && next.share == here.at.share) continue;
-        const double value = value_at(next);
-        if (value >= here.cost) continue;
-        here = {value, next};
-        moved = true;
-      }
-    }
-  }
-  return here;
-}
-
 std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first, const ConnectionMotion& second,
                                                    double shortest_s, double give_up_cm) const {
   const LegalRange range{&first, &second, shortest_s > 0 ? shortest_s : options_.shortest_s};
-  const Forms parts = forms(first, second);
-  const std::vector<Minimum> minima = minima_of_table(parts, range);
+  const PairCost cost(*curves_, first, second);
+  const std::vector<Minimum> minima = minima_of_table(cost, range);
   if (minima.empty()) return std::nullopt;
   constexpr double worth_looking = 1.4;
   const double least = minima.front().cost;
   if (std::isfinite(least) && 100 * std::sqrt(std::max(least, 0.0)) > worth_looking * give_up_cm) return std::nullopt;
 
-  Minimum best{infinite, {}};
-  std::vector<LegalRange::Point> tried;
+  RefinedConnection best;
+  int evaluations = 0;
+  std::vector<const Minimum*> tried;
   for (const Minimum& start : minima) {
     if (tried.size() == minima_refined || (std::isfinite(start.cost) && start.cost > worth_refining * least)) break;
-    const bool near = std::ranges::any_of(tried, [&](const LegalRange::Point& other) {
-      return std::abs(other.log_u - start.at.log_u) < 0.6 && std::abs(other.share - start.at.share) < 0.06;
+    const bool near = std::ranges::any_of(tried, [&](const Minimum* other) {
+      return std::abs(other->log_u - start.log_u) < 0.6 && std::abs(other->share - start.share) < 0.06;
     });
     if (near) continue;
-    tried.push_back(start.at);
-    const Minimum found = descend(parts, range, start);
+    tried.push_back(&start);
+    const RefinedConnection found = refine(cost, range, start.log_u, start.v, options_.minimiser);
+    evaluations += found.evaluations;
     if (found.cost < best.cost) best = found;
   }
   if (best.cost == infinite) return std::nullopt;
 
-  Connection out{
-      .scale = std::exp2(best.at.log_u), .shift = range.shift(best.at), .cost_cm = 100 * std::sqrt(best.cost)};
+  Connection out{.scale = std::exp2(best.log_u),
+                 .shift = best.v,
+                 .cost_cm = 100 * std::sqrt(std::max(best.cost, 0.0)),
+                 .evaluations = evaluations};
   const Interval s = overlap_of(out.scale, out.shift);
   out.leave_s = first.start_s + first.length_s * (out.scale * s.begin + out.shift);
   out.left_s = first.start_s + first.length_s * (out.scale * s.end + out.shift);

@@ -16,14 +16,15 @@
 //   E = <P, S11> - 2 <Q, S12> + <W, S22>,
 //   P = mean b(u s + v) b(u s + v)',  Q = mean b(u s + v) b(s)',  W = mean b(s) b(s)'
 //
-// and P, Q, W do not depend on the motions: they are tabulated once over a grid of (u, v). The best cells of the grid
-// are refined to the nearest minimum.
+// and P, Q, W do not depend on the motions: they are tabulated once over a grid of (u, v). From the best cells of the
+// grid a minimiser in bounds goes down to the nearest minimum, to 1e-7 of the range (numerics/bounded_minimum.h).
 //
 // Legal: the overlap lasts at least `shortest_s` by the clock of either motion, and motion 1 is played at 1/2 to 2
 // times the speed of motion 2.
 #pragma once
 
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,14 +32,21 @@
 #include <Eigen/Core>
 
 #include "kinespace/fpca/registered_space.h"
+#include "kinespace/numerics/bounded_minimum.h"
 #include "kinespace/synthesis/curve_sampler.h"
 
 namespace kinespace {
+namespace connections {
+class FunctionCurves;
+class PairCost;
+struct LegalRange;
+}  // namespace connections
 
 struct ConnectionOptions {
   double window_s = 2;      // (0.1, 20]; how much of the end of one and of the start of the other may overlap
   double shortest_s = 0.3;  // [0.1, window_s]; the smallest overlap by either clock
   int functions = 20;       // 4 .. 64 of the space: K
+  BoxMinimiser minimiser = minimise_in_box;  // what refines (u, v); any that keeps to its contract finds the same
 
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;
@@ -51,13 +59,14 @@ struct ConnectionMotion {
   Eigen::MatrixXf scores;  // K x C, each curve times its w_c
   Eigen::MatrixXf poses;  // weighted curves that are no rates, [bound cell][curve]: what bounds a connection from below
   Eigen::VectorXf spread;       // how far the motion gets from that pose within the cell
-  Eigen::MatrixXf rates, rest;  // K x K: the motion's own parts of S, of curves that are rates and of the rest
+  Eigen::MatrixXd rates, rest;  // K x K: the motion's own parts of S, of curves that are rates and of the rest
 };
 
 struct Connection {
-  double scale = 1;    // u, in the motions' own times [0, 1]
-  double shift = 0;    // v
-  double cost_cm = 0;  // sqrt(E) in cm: the root mean square distance of the joints, roughly
+  double scale = 1;     // u, in the motions' own times [0, 1]
+  double shift = 0;     // v
+  double cost_cm = 0;   // sqrt(E) in cm: the root mean square distance of the joints, roughly
+  int evaluations = 0;  // of E, that the refinement took
   // The overlap by the clocks of the two clips, in seconds.
   double leave_s = 0, left_s = 0;     // of the first: where it begins and where it ends
   double enter_s = 0, entered_s = 0;  // of the second
@@ -101,20 +110,17 @@ class ConnectionSpace {
     std::vector<double> overlaps;                                                 // |S|
     Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> grams;  // [shift][P, 2Q, W]
   };
-  struct Forms;
-  struct LegalRange;
   struct Minimum;
   void tabulate();
   void interpolate(double x, float* out, Eigen::Index step = 1) const;  // out[k * step]
-  [[nodiscard]] Forms forms(const ConnectionMotion& first, const ConnectionMotion& second) const;
-  [[nodiscard]] std::vector<Minimum> minima_of_table(const Forms& forms, const LegalRange& range) const;
-  [[nodiscard]] Minimum descend(const Forms& forms, const LegalRange& range, const Minimum& start) const;
-  [[nodiscard]] double evaluate(const Forms& forms, double u, double v) const;
+  [[nodiscard]] std::vector<Minimum> minima_of_table(const connections::PairCost& cost,
+                                                     const connections::LegalRange& range) const;
 
   ConnectionOptions options_;
   Eigen::RowVectorXd weights_;    // w_c of the invariant curves
   Eigen::RowVectorXd reference_;  // taken off each curve before it is scored: changes no difference, keeps digits
   SampleMatrix functions_;
+  std::shared_ptr<const connections::FunctionCurves> curves_;                   // the functions between their points
   Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> fine_;  // the functions, finely
   std::vector<Cells> table_;
 };

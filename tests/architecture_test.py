@@ -13,24 +13,26 @@ import tempfile
 # The arrows: what each folder may include beside itself. A new folder gets a line here.
 ARROWS = {
     "base": "",
+    "numerics": "base",
+    "alglib": "base numerics",
     "gltf": "base",
     "motion": "base gltf",
     "storage": "base",
     "kernels": "base",
     "entropy": "base",
-    "fpca": "base motion storage footskate kernels",
+    "fpca": "base numerics motion storage footskate kernels",
     "library": "base motion storage footskate kernels fpca",
     "footskate": "base motion storage",
-    "synthesis": "base motion storage footskate kernels fpca library",
+    "synthesis": "base numerics motion storage footskate kernels fpca library",
     "repeats": "base motion",
     "mesh": "base gltf motion storage",
     "codecs": "base motion storage kernels fpca library repeats entropy",
     "mesh_codecs": "base motion storage mesh entropy",
     "include": "base motion storage kernels fpca library footskate synthesis repeats mesh codecs mesh_codecs",
     "examples": "base motion storage kernels fpca library footskate synthesis mesh codecs",
-    "bench": "base motion storage kernels fpca library footskate synthesis repeats mesh entropy codecs mesh_codecs examples",
+    "bench": "base numerics alglib motion storage kernels fpca library footskate synthesis repeats mesh entropy codecs mesh_codecs examples",
     "cli": "base motion storage kernels fpca library footskate synthesis repeats mesh codecs mesh_codecs bench",
-    "tests": "base gltf motion storage kernels fpca library footskate synthesis repeats mesh entropy codecs mesh_codecs examples bench cli",
+    "tests": "base numerics alglib gltf motion storage kernels fpca library footskate synthesis repeats mesh entropy codecs mesh_codecs examples bench cli",
 }
 # Folders whose headers are included as kinespace/FOLDER/..., as those who install the library include them.
 LIBRARIES = set(ARROWS) - {"include", "examples", "bench", "cli", "tests"}
@@ -80,7 +82,7 @@ def arrows(root, file, text):
     for included in INCLUDE.findall(text):
         path = included.removeprefix("kinespace/")
         target = path.split("/")[0]
-        if included.endswith((".inc", "kinespace/version.h")):
+        if included.endswith((".inc", "kinespace/version.h", "kinespace/licence.h")):
             continue  # written by the build
         if file.suffix == ".cl" and (root / file.parent / included).is_file():
             continue  # kernels are put together from their own folder

@@ -64,12 +64,13 @@ Eigen::MatrixXd from_lower_triangle(const Eigen::VectorXd& values, Eigen::Index 
   return out;
 }
 
-Bytes group_section(const FunctionGroup& group, const CurveMoments& moments, bool pinned) {
+Bytes group_section(const FunctionGroup& group, const CurveMoments& moments, bool pinned, bool noise) {
   ByteWriter out;
   put_varint(out, static_cast<std::uint64_t>(group.functions.cols()));
   put_varint(out, static_cast<std::uint64_t>(moments.count()));
   out.put(group.variance);
   if (pinned) out.put(group.left);
+  if (noise) out.put(group.noise.value_or(0));
   put_matrix(out, group.mean);
   put_matrix(out, group.eigenvalues);
   put_matrix(out, group.functions);
@@ -79,7 +80,7 @@ Bytes group_section(const FunctionGroup& group, const CurveMoments& moments, boo
 }
 
 std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> bytes, int points, bool pinned,
-                                                   const std::string& source) {
+                                                   bool noise, const std::string& source) {
   ByteReader in(bytes, source);
   const std::uint64_t functions = get_varint(in);
   if (functions > static_cast<std::uint64_t>(points)) {
@@ -90,12 +91,22 @@ std::pair<FunctionGroup, CurveMoments> parse_group(std::span<const std::byte> by
   FunctionGroup group;
   group.variance = in.get<double>();
   if (pinned) group.left = in.get<double>();
+  const double noise_variance = noise ? in.get<double>() : 0;
+  if (!(noise_variance >= 0) || !std::isfinite(noise_variance)) {
+    in.fail("a noise variance that is none", "0 or more, finite");
+  }
   if (!std::isfinite(group.variance) || !std::isfinite(group.left))
     in.fail("a variance that is no number", "a finite one");
   group.mean = get_matrix(in, points, 1);
   group.eigenvalues = get_matrix(in, k, 1);
   group.functions = get_matrix(in, points, k);
   if (!pinned) group.left = group.variance - group.eigenvalues.sum();
+  if (noise) {
+    if (!(group.eigenvalues.array() > 0).all() || !group.eigenvalues.allFinite() || !group.functions.allFinite()) {
+      in.fail("functions without variance", "eigenvalues above 0");
+    }
+    group.expect_scores(noise_variance);
+  }
   const Eigen::VectorXd mean = get_matrix(in, points, 1);
   const Eigen::MatrixXd scatter = pinned ? from_lower_triangle(get_matrix(in, points * (points + 1) / 2, 1), points)
                                          : get_matrix(in, points, points);
@@ -339,6 +350,8 @@ Bytes pack_space(const MotionSpace& space) {
   if (space.options_.functions) out.set_option("functions", static_cast<std::int64_t>(*space.options_.functions));
   out.set_option("smooth", static_cast<std::int64_t>(space.options_.smooth ? 1 : 0));
   if (space.options_.pinned) out.set_option("pinned", std::int64_t{1});
+  const bool noise = std::ranges::any_of(space.groups_, [](const FunctionGroup& g) { return g.noise.has_value(); });
+  if (noise) out.set_option("noise", std::int64_t{1});
   if (space.options_.cycles > 0) out.set_option("cycles", static_cast<std::int64_t>(space.options_.cycles));
   if (space.options_.pace != 1) out.set_option("pace", space.options_.pace);
   out.add_section("skeleton", pack_skeleton(space.skeleton_));
@@ -346,7 +359,7 @@ Bytes pack_space(const MotionSpace& space) {
   put_matrix(references, space.references_);
   out.add_section("references", std::move(references).take());
   for (std::size_t g = 0; g < space.groups_.size(); ++g) {
-    out.add_section(group_name(g), group_section(space.groups_[g], space.moments_[g], space.options_.pinned));
+    out.add_section(group_name(g), group_section(space.groups_[g], space.moments_[g], space.options_.pinned, noise));
   }
   return out.finish();
 }
@@ -364,6 +377,7 @@ MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& so
   }
   options.smooth = stream.integer_option("smooth", 0, 1) == 1;
   if (stream.find_option("pinned") != nullptr) options.pinned = stream.integer_option("pinned", 0, 1) == 1;
+  const bool noise = stream.find_option("noise") != nullptr && stream.integer_option("noise", 0, 1) == 1;
   if (stream.find_option("cycles") != nullptr) options.cycles = static_cast<int>(stream.integer_option("cycles", 0, 8));
   if (stream.find_option("pace") != nullptr) options.pace = stream.number_option("pace", 1, 100);
   MotionSpace space(unpack_skeleton(stream.section("skeleton"), source), options, points);
@@ -372,7 +386,7 @@ MotionSpace unpack_space(std::span<const std::byte> bytes, const std::string& so
   references.expect_end();
   for (int g = 0; g < space.group_count(); ++g) {
     auto [group, moments] =
-        parse_group(stream.section(group_name(static_cast<std::size_t>(g))), points, options.pinned, source);
+        parse_group(stream.section(group_name(static_cast<std::size_t>(g))), points, options.pinned, noise, source);
     space.groups_.push_back(std::move(group));
     space.moments_.push_back(std::move(moments));
   }

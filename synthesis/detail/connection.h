@@ -10,6 +10,7 @@ namespace kinespace::connections {
 
 constexpr int bound_cells = 40;  // a stretch is bounded from below over so many cells of its time
 constexpr double least_speed = 0.5, largest_speed = 2;
+constexpr double scale_octaves = 3;  // u from 1/8 to 8
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
 struct Interval {

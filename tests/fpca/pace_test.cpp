@@ -114,6 +114,25 @@ TEST(Smoothing, finds_the_functions_under_noise) {
   }
 }
 
+// A local linear fit has a bandwidth, and so flattens peaks however many curves there are; the spline knows its noise.
+TEST(Smoothing, of_the_mean_by_a_spline_takes_noise_and_leaves_the_rest) {
+  constexpr int points = 80;
+  Eigen::VectorXd truth(points);
+  for (int t = 0; t < points; ++t) truth[t] = test::sample_mean(t / (points - 1.0));
+  // The curves' own part of the mean is no noise.
+  const auto error = [&](int curves, double noise, MeanEstimate mean) {
+    const CurveMatrix clean = test::sample_curves(curves, points, 0, 4);
+    const CurveMatrix y = clean + noise * test::random_curves(curves, points, 9);
+    const FunctionalPca f = fit_functional_pca(y, {.mean = mean, .estimate_noise = true, .count = 2});
+    return (f.observed_mean - clean.colwise().mean().transpose()).norm();
+  };
+  const double few = error(20, 1, MeanEstimate::spline);
+  EXPECT_LT(few, 0.6 * error(20, 1, MeanEstimate::cross_sectional));
+  EXPECT_LT(few, error(20, 1, MeanEstimate::smooth));
+  EXPECT_LT(error(4000, 0.1, MeanEstimate::spline), 0.5 * error(4000, 0.1, MeanEstimate::smooth));
+  EXPECT_LT(error(50, 0, MeanEstimate::spline), 1e-3);
+}
+
 TEST(Smoothing, keeps_the_functions_of_the_consistent_mode_orthonormal) {
   const FunctionalPca f = fit_functional_pca(test::sample_curves(200, 70, 0.2), noisy(FpcaMode::consistent));
   const Eigen::MatrixXd gram = f.functions.transpose() * f.weights.asDiagonal() * f.functions;
