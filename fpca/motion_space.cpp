@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
 #include "kinespace/kernels/covariance.h"
@@ -37,6 +38,12 @@ SampleMatrix lines_between_ends(const SampleMatrix& samples) {
   SampleMatrix out = s * (samples.bottomRows(1) - samples.topRows(1));
   out.rowwise() += samples.row(0);
   return out;
+}
+
+// The two rows of scores that are the ends of the curves.
+void write_ends(const SampleMatrix& samples, ScoreMatrix& scores) {
+  scores.row(0) = samples.row(0).cast<float>();
+  scores.row(1) = samples.row(samples.rows() - 1).cast<float>();
 }
 
 // Moments of what curves are above the lines between their ends. That is linear in the curves, B f with
@@ -170,6 +177,14 @@ int MotionSpace::group_of(int curve) const {
   return 0;
 }
 
+std::vector<int> MotionSpace::curves_of_group(int group) const {
+  std::vector<int> out;
+  for (int c = 0; c < curves(); ++c) {
+    if (group_of(c) == group) out.push_back(c);
+  }
+  return out;
+}
+
 std::vector<CurveMoments> MotionSpace::empty_moments() const {
   return std::vector<CurveMoments>(static_cast<std::size_t>(group_count()), CurveMoments(points_));
 }
@@ -177,12 +192,8 @@ std::vector<CurveMoments> MotionSpace::empty_moments() const {
 void MotionSpace::accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments,
                              const Compute& compute) const {
   assert(moments.size() == static_cast<std::size_t>(group_count()));
-  std::vector<int> members;
   for (int g = 0; g < group_count(); ++g) {
-    members.clear();
-    for (int c = 0; c < curves(); ++c) {
-      if (group_of(c) == g) members.push_back(c);
-    }
+    const std::vector<int> members = curves_of_group(g);
     CurveMatrix block(static_cast<Eigen::Index>(samples.size() * members.size()), points_);
     Eigen::Index row = 0;
     for (const SampleMatrix& s : samples) {
@@ -192,16 +203,16 @@ void MotionSpace::accumulate(std::span<const SampleMatrix> samples, std::vector<
   }
 }
 
-void MotionSpace::fit(std::vector<CurveMoments> moments) {
+void MotionSpace::fit(std::vector<CurveMoments> moments, const Compute& compute) {
   groups_.clear();
   FunctionalPcaWorkspace workspace(points_, fpca_options(options_));
   for (const CurveMoments& m : moments) {
     if (m.count() == 0) {
       groups_.push_back({Eigen::VectorXd::Zero(points_), Eigen::MatrixXd(points_, 0), Eigen::VectorXd(), 0, 0});
     } else if (options_.pinned) {
-      groups_.push_back(fit_pinned(m));
+      groups_.push_back(fit_pinned(m));  // without smoothing: nothing for a device
     } else {
-      FunctionalPca pca = workspace.fit(m);
+      FunctionalPca pca = workspace.fit(m, compute);
       const double variance = pca.all_eigenvalues.cwiseMax(0).sum();
       const double left = variance - pca.eigenvalues.sum();
       groups_.push_back({pca.observed_mean, pca.observed_functions, pca.eigenvalues, variance, left});
@@ -225,12 +236,26 @@ FunctionGroup MotionSpace::fit_pinned(const CurveMoments& moments) const {
 }
 
 ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& compute) const {
+  return std::move(scores(std::span(&samples, 1), compute).front());
+}
+
+std::vector<ScoreMatrix> MotionSpace::scores(std::span<const SampleMatrix> samples, const Compute& compute) const {
+  const auto count = static_cast<double>(samples.size());
+  const double flops = 2.0 * count * points_ * curves() * functions();
+  if (flops > 0 && compute.device_for(KernelFamily::projection, flops) != nullptr) {
+    return scores_on_device(samples, compute);
+  }
+  std::vector<ScoreMatrix> out(samples.size());
+  tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) { out[i] = scores_here(samples[i]); });
+  return out;
+}
+
+ScoreMatrix MotionSpace::scores_here(const SampleMatrix& samples) const {
   assert(samples.rows() == points_ && samples.cols() == curves());
   ScoreMatrix out = ScoreMatrix::Zero(rows(), curves());
   SampleMatrix above;  // what functions describe, where it is not the samples themselves
   if (options_.pinned) {
-    out.row(0) = samples.row(0).cast<float>();
-    out.row(1) = samples.row(points_ - 1).cast<float>();
+    write_ends(samples, out);
     above = samples - lines_between_ends(samples);
   }
   const SampleMatrix& curves_of = options_.pinned ? above : samples;
@@ -238,13 +263,6 @@ ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& comp
   if (groups_.size() == 1) {
     const FunctionGroup& g = groups_.front();
     const Eigen::MatrixXd projector = (g.functions.array().colwise() * weights_.array()).matrix();
-    const double flops = 2.0 * static_cast<double>(projector.size()) * curves();
-    if (compute.device_for(KernelFamily::projection, flops) != nullptr) {
-      const RowMatrix<float> curve_rows = curves_of.transpose().cast<float>();
-      const RowMatrix<float> matrix = projector.cast<float>();
-      of_functions = project(curve_rows, g.mean.cast<float>(), matrix, compute).transpose();
-      return out;
-    }
     const SampleMatrix centred = curves_of.colwise() - g.mean;
     of_functions = (projector.transpose() * centred).cast<float>();
     return out;
@@ -253,6 +271,35 @@ ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& comp
     const FunctionGroup& g = groups_[static_cast<std::size_t>(group_of(c))];
     const Eigen::VectorXd weighted = (curves_of.col(c) - g.mean).cwiseProduct(weights_);
     of_functions.col(c).head(g.functions.cols()) = (g.functions.transpose() * weighted).cast<float>();
+  }
+  return out;
+}
+
+std::vector<ScoreMatrix> MotionSpace::scores_on_device(std::span<const SampleMatrix> samples,
+                                                       const Compute& compute) const {
+  std::vector<ScoreMatrix> out(samples.size(), ScoreMatrix::Zero(rows(), curves()));
+  const Eigen::Index ends = rows() - functions();
+  for (int group = 0; group < group_count(); ++group) {
+    const std::vector<int> members = curves_of_group(group);
+    const FunctionGroup& g = groups_[static_cast<std::size_t>(group)];
+    RowMatrix<float> curves(static_cast<Eigen::Index>(samples.size() * members.size()), points_);
+    Eigen::Index row = 0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      assert(samples[i].rows() == points_ && samples[i].cols() == this->curves());
+      if (options_.pinned && group == 0) write_ends(samples[i], out[i]);
+      const SampleMatrix lines = options_.pinned ? lines_between_ends(samples[i]) : SampleMatrix();
+      for (const int c : members) {
+        curves.row(row) = samples[i].col(c).transpose().cast<float>();
+        if (options_.pinned) curves.row(row) = (samples[i].col(c) - lines.col(c)).transpose().cast<float>();
+        ++row;
+      }
+    }
+    const RowMatrix<float> projector = (g.functions.array().colwise() * weights_.array()).matrix().cast<float>();
+    const RowMatrix<float> found = project(curves, g.mean.cast<float>(), projector, compute);
+    row = 0;
+    for (ScoreMatrix& scores : out) {
+      for (const int c : members) scores.col(c).segment(ends, found.cols()) = found.row(row++).transpose();
+    }
   }
   return out;
 }
