@@ -1,8 +1,9 @@
 #include "kinespace/kernels/calibration.h"
 
 #include <algorithm>
-#include <cmath>
+#include <chrono>
 #include <limits>
+#include <optional>
 #include <thread>
 
 #include "kinespace/base/error.h"
@@ -55,7 +56,11 @@ double DeviceCalibration::from_flops(KernelFamily family) const {
 }
 
 DeviceCalibration calibrate(const std::string& choice, const Progress& progress) {
+  // The driver's own compiler first: it keeps what it made, so that a later process does not wait for it.
+  const Compute compiling = Compute::open(choice);
+  const auto start = std::chrono::steady_clock::now();
   const Compute device = Compute::open(choice);
+  const double opening_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const std::optional<DeviceInfo> info = device.device_info();
   if (!info) {
     throw Error(ErrorKind::usage, {.found = "device '" + choice + "'", .expected = "opencl or opencl:N to measure"});
@@ -73,6 +78,7 @@ DeviceCalibration calibrate(const std::string& choice, const Progress& progress)
     if (!measured(kernel)) continue;
     progress.check_stop();
     progress.at("calibrate", static_cast<double>(out.kernels.size()) / count);
+    static_cast<void>(kernel.seconds(kernel.calibration_sizes.front(), compiling, 1));
     const Line here = measure_line(kernel, processor);
     const Line there = measure_line(kernel, device);
     out.kernels.push_back({.family = kernel.family,
@@ -80,7 +86,7 @@ DeviceCalibration calibrate(const std::string& choice, const Progress& progress)
                            .processor_overhead_s = here.overhead_s,
                            .device_rate = there.rate,
                            .device_overhead_s = there.overhead_s,
-                           .startup_s = there.startup_s});
+                           .startup_s = opening_s + there.startup_s});
   }
   progress.at("calibrate", 1);
   return out;

@@ -5,8 +5,8 @@
 //
 //   t(f) = overhead + f / rate          f: floating-point operations,
 //
-// and the device pays from the f on at which it is done first, its start-up (opening it, building the program) counted
-// with every call, so that one call alone is never slower for it:
+// and the device pays from the f on at which it is done first, its start-up (opening it, loading the program that the
+// driver compiled before) counted with every call, so that one call alone is never slower for it:
 //
 //   from = (device overhead + start-up - processor overhead) / (1 / processor rate - 1 / device rate)
 //
