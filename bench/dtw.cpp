@@ -13,6 +13,7 @@
 #include "bench/timing.h"
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/pose_features.h"
+#include "kinespace/kernels/calibration.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace {
@@ -123,7 +124,7 @@ class CaseRunner {
 }  // namespace
 
 BenchReport bench_dtw(const BenchOptions& options) {
-  const auto compute = Compute::open(options.device);
+  const auto compute = open_calibrated(options.device);
   const FeatureSet set = clip_features(options.data / "bandai2");
   BenchReport report{
       .bench = "dtw", .device = {}, .threads = static_cast<int>(std::thread::hardware_concurrency()), .results = {}};
@@ -136,6 +137,7 @@ BenchReport bench_dtw(const BenchOptions& options) {
   };
   for (const auto& one : cases) runner.run(one, report);
   report.device = compute.describe();
+  report.kernels = compute.uses();
   return report;
 }
 

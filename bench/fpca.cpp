@@ -19,6 +19,7 @@
 #include "bench/report.h"
 #include "bench/space.h"
 #include "kinespace/fpca/functional_pca.h"
+#include "kinespace/kernels/calibration.h"
 #include "kinespace/motion/curves.h"
 #include "kinespace/motion/read.h"
 
@@ -204,7 +205,7 @@ void compare_golden(const fs::path& folder, BenchReport& report) {
 }  // namespace
 
 BenchReport bench_fpca(const BenchOptions& options) {
-  const Compute compute = Compute::open(options.device);
+  const Compute compute = open_calibrated(options.device);
   BenchReport report{.bench = "fpca", .device = "", .threads = 2, .results = {}};
   if (const auto golden = golden_folder(options)) compare_golden(*golden, report);
   measure_speed(options, report);
@@ -212,6 +213,7 @@ BenchReport bench_fpca(const BenchOptions& options) {
   basis_rows(options, report);
   space_rows(options, compute, report);
   report.device = compute.describe();
+  report.kernels = compute.uses();
   return report;
 }
 

@@ -59,6 +59,7 @@ BenchReport bench_kernels(const BenchOptions& options) {
     measure(kernel, Compute(), "processor", report);
     if (has_device) measure(kernel, device, "OpenCL", report);
   }
+  report.kernels = device.uses();
   return report;
 }
 

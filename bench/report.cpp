@@ -46,6 +46,16 @@ nlohmann::ordered_json json(const BenchTable& table) {
   return {{"title", table.title}, {"columns", table.columns}, {"rows", std::move(rows)}};
 }
 
+nlohmann::ordered_json json(const KernelUses& uses) {
+  nlohmann::ordered_json out = nlohmann::ordered_json::array();
+  for (std::size_t f = 0; f < uses.size(); ++f) {
+    out.push_back({{"kernel", name_of(kernel_families[f])},
+                   {"launches", uses[f].launches},
+                   {"processor_calls", uses[f].processor_calls}});
+  }
+  return out;
+}
+
 }  // namespace
 
 #define KINESPACE_BENCH(name) Bench{#name, bench_##name},
@@ -70,11 +80,9 @@ std::string to_json(const BenchReport& report) {
   }
   Json tables = Json::array();
   for (const BenchTable& table : report.tables) tables.push_back(json(table));
-  const Json object{{"bench", report.bench},
-                    {"device", report.device},
-                    {"threads", report.threads},
-                    {"results", results},
-                    {"tables", tables}};
+  const Json object{{"bench", report.bench},     {"device", report.device},
+                    {"threads", report.threads}, {"results", results},
+                    {"tables", tables},          {"kernels", report.kernels ? json(*report.kernels) : Json()}};
   return object.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

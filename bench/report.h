@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "kinespace/kernels/device.h"
+
 namespace kinespace {
 
 struct BenchResult {
@@ -55,6 +57,7 @@ struct BenchReport {
   std::vector<BenchResult> results;
   std::vector<BenchTable> tables;
   std::vector<BenchPicture> pictures;
+  std::optional<KernelUses> kernels = {};  // what ran where, of benches that take a device
 };
 
 struct BenchOptions {
@@ -66,7 +69,8 @@ struct BenchOptions {
 };
 
 // The report as one JSON object: bench, device, threads, results: [{name, data, value, unit, bar, ok}], bar null where
-// there is none; tables: [{title, columns, rows}], an empty cell null.
+// there is none; tables: [{title, columns, rows}], an empty cell null; kernels: [{kernel, launches, processor_calls}] or
+// null.
 [[nodiscard]] std::string to_json(const BenchReport& report);
 
 // The report as a markdown table: a heading, what computed it, one row a result. What docs/results.md is made of.

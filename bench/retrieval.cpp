@@ -17,6 +17,7 @@
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/clip_space.h"
 #include "kinespace/fpca/pose_features.h"
+#include "kinespace/kernels/calibration.h"
 #include "kinespace/kernels/dtw.h"
 #include "kinespace/library/library_builder.h"
 #include "kinespace/motion/read.h"
@@ -185,7 +186,7 @@ class RetrievalRows {
 }  // namespace
 
 BenchReport bench_retrieval(const BenchOptions& options) {
-  const Compute compute = Compute::open(options.device);
+  const Compute compute = open_calibrated(options.device);
   const Labelled data = load_labelled(options.data / "bandai2");
   OrientationMoments orientations(curve_layout(data.clips.front().skeleton).joint_count());
   for (const PreparedClip& clip : data.clips) orientations.add(clip.curves.values);
@@ -211,6 +212,7 @@ BenchReport bench_retrieval(const BenchOptions& options) {
     rows.add("motion vectors", far, ours, &l2);
     rows.add("motion vectors, best 50 by DTW", far, reranked, &dtw_all);
   }
+  report.kernels = compute.uses();
   return report;
 }
 

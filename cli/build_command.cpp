@@ -6,7 +6,9 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/device_choice.h"
 #include "cli/json_output.h"
+#include "cli/stage_log.h"
 #include "kinespace/library/library_builder.h"
 #include "kinespace/motion/file_formats.h"
 
@@ -70,16 +72,19 @@ void run_build(BuildOptions options, Session& session) {
   library.space.space.grouping = grouping_of(options.grouping);
   if (options.functions > 0) library.space.space.functions = options.functions;
   if (!options.asf.empty()) library.asf = options.asf;
-  const Compute compute = Compute::open(options.device);
   const auto files = find_motion_files(options.inputs);
   session.detail(fmt::format("{} motion files", files.size()));
+  const Compute compute = open_device(options.device, session, files.size());
+  StageLog stages(compute);
   session.when_stopped = [output = options.output] { return what_a_stopped_build_leaves(output); };
-  const LibraryReport report = build_library(files, options.output, library, compute, session.progress());
+  const LibraryReport report = build_library(files, options.output, library, compute, stages.watch(session.progress()));
   session.finish_progress();
   for (const std::string& doubt : report.doubts) session.note(doubt);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-  const Json result = to_json(report, options.output, elapsed.count());
-  options.json ? print_json(result) : print_fields(result);
+  Json result = to_json(report, options.output, elapsed.count());
+  if (!options.json) print_fields(result);
+  stages.finish(result, session);
+  if (options.json) print_json(result);
 }
 
 }  // namespace
@@ -114,7 +119,7 @@ void add_build(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_flag("--no-align", options->no_align,
                     "As many sequences, but of equal length at any phase, and no warps: what registration is worth");
-  command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
+  add_device_option(command, options->device);
   command->add_flag("--json", options->json, "Print the result as one JSON object");
   session.files.reads(command, {"CLIPS", "--asf"});
   session.files.writes(command, {"--output"}, FileKind::database);

@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
+#include "cli/stage_log.h"
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
 #include "kinespace/codecs/pose_space/library_basis.h"
@@ -98,20 +99,24 @@ std::map<std::string, double, std::less<>> all_settings(const EncodeOptions& opt
 }
 
 void run_encode(const EncodeOptions& options, Session& session) {
-  const Progress progress = session.progress();
+  StageLog stages{Compute()};  // no codec has kernels
+  const Progress progress = stages.watch(session.progress());
   const std::vector<Clip> clips = read_clips(input_files(options.inputs), progress);
   std::optional<PoseSpaceBasis> basis;
   if (options.basis) {
+    stages.begin("basis");
     basis = library_basis(*options.basis, clips.front().skeleton.tree_hash(), progress);
   }
   const CodecOptions codec_options{.target = options.target,
                                    .basis = basis ? &*basis : nullptr,
                                    .settings = all_settings(options),
                                    .progress = progress};
+  stages.begin("encode");
   const auto start = std::chrono::steady_clock::now();
   const Bytes stream = encode(options.codec, clips, codec_options);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   session.finish_progress();
+  stages.begin("write");
   write_file_atomically(options.output, stream);
 
   double frames = 0;
@@ -122,18 +127,20 @@ void run_encode(const EncodeOptions& options, Session& session) {
   }
   const MeasuredError error = Bitstream::parse(stream, options.output.string()).error();
   const auto bytes = static_cast<double>(stream.size());
-  const Json result{{"codec", options.codec},
-                    {"output", options.output.string()},
-                    {"clips", clips.size()},
-                    {"frames", static_cast<std::int64_t>(frames)},
-                    {"bytes", stream.size()},
-                    {"bytes_per_frame", bytes / frames},
-                    {"ratio", raw / bytes},
-                    {"mean_joint_error_cm", error.mean_joint_error_cm},
-                    {"max_joint_error_cm", error.max_joint_error_cm},
-                    {"shell_error_cm", error.shell_error_cm},
-                    {"encode_frames_per_s", frames / seconds}};
-  options.json ? print_json(result) : print_fields(result);
+  Json result{{"codec", options.codec},
+              {"output", options.output.string()},
+              {"clips", clips.size()},
+              {"frames", static_cast<std::int64_t>(frames)},
+              {"bytes", stream.size()},
+              {"bytes_per_frame", bytes / frames},
+              {"ratio", raw / bytes},
+              {"mean_joint_error_cm", error.mean_joint_error_cm},
+              {"max_joint_error_cm", error.max_joint_error_cm},
+              {"shell_error_cm", error.shell_error_cm},
+              {"encode_frames_per_s", frames / seconds}};
+  if (!options.json) print_fields(result);
+  stages.finish(result, session);
+  if (options.json) print_json(result);
 }
 
 void print_settings() {

@@ -5,8 +5,10 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/device_choice.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
+#include "cli/stage_log.h"
 #include "kinespace/base/error.h"
 #include "kinespace/base/printable.h"
 #include "kinespace/motion/file_formats.h"
@@ -64,6 +66,7 @@ std::vector<Match> nearest(LibraryView& library, ClipCurves curves, const Skelet
                            const Progress& progress) {
   if (!options.windows)
     return nearest_motions(library, std::move(curves), skeleton, options.query, except, compute, progress);
+  progress.at("windows", 0);
   return nearest_windows(library, curves, skeleton, options.range,
                          {.k = options.query.k, .overlapping = options.overlapping, .labels = options.query.labels},
                          {.weighted = options.query.weighted}, except);
@@ -93,9 +96,15 @@ std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options
 void run_query(QueryCommandOptions options, Session& session) {
   options.query.rerank = !options.no_rerank;
   options.query.validate();
+  const Compute compute = open_device(options.device, session);
+  StageLog stages(compute);
+  stages.begin("read");
   LibraryView library(options.library);
-  const std::vector<Match> matches = find(library, options, Compute::open(options.device), session.stops(), session);
-  options.json ? print_json(to_json(options.clip, matches)) : print_matches(matches);
+  const std::vector<Match> matches = find(library, options, compute, stages.watch(session.stops()), session);
+  Json result = to_json(options.clip, matches);
+  if (!options.json) print_matches(matches);
+  stages.finish(result, session);
+  if (options.json) print_json(result);
 }
 
 }  // namespace
@@ -122,7 +131,7 @@ void add_query(CLI::App& app, Session& session) {
   command->add_option("--to", options->range.to_s, "Where it ends; a second later unless given")->needs(windows);
   command->add_flag("--overlapping", options->overlapping, "Also windows that overlap a nearer one in the same clip")
       ->needs(windows);
-  command->add_option("--device", options->device, "auto, cpu, opencl or opencl:N")->capture_default_str();
+  add_device_option(command, options->device);
   command->add_flag("--json", options->json, "Print the matches as one JSON object");
   session.files.reads(command, {"LIB", "CLIP"});
   command->callback([options, &session] { run_query(*options, session); });

@@ -58,7 +58,7 @@ void ClipSpaceOptions::validate() const {
 }
 
 ClipSpace ClipSpace::build(const PreparedSource& clips, const Eigen::Matrix4Xd& references,
-                           const ClipSpaceOptions& options, const Progress& progress) {
+                           const ClipSpaceOptions& options, const Compute& compute, const Progress& progress) {
   options.validate();
   if (clips.count == 0) throw Error(ErrorKind::usage, {.found = "no clips", .expected = "one clip or more"});
   MotionSpace space(clips.load(0).skeleton, {.functions = options.functions}, clip_points);
@@ -81,18 +81,18 @@ ClipSpace ClipSpace::build(const PreparedSource& clips, const Eigen::Matrix4Xd& 
   std::vector<CurveMoments> moments = space.empty_moments();
   for_each_block(clips, space, progress, [&](std::vector<SampleMatrix> block) {
     for (SampleMatrix& s : block) s.leftCols<3>() *= scale;
-    space.accumulate(block, moments);
+    space.accumulate(block, moments, compute);
   });
   space.fit(std::move(moments));
   progress.at("index", 1);
   return {std::move(space), scale};
 }
 
-ClipSpace ClipSpace::extend(const PreparedSource& clips, const Progress& progress) const {
+ClipSpace ClipSpace::extend(const PreparedSource& clips, const Compute& compute, const Progress& progress) const {
   std::vector<CurveMoments> moments = space_.moments();
   for_each_block(clips, space_, progress, [&](std::vector<SampleMatrix> block) {
     for (SampleMatrix& s : block) s.leftCols<3>() *= travel_scale_;
-    space_.accumulate(block, moments);
+    space_.accumulate(block, moments, compute);
   });
   MotionSpace extended(space_.skeleton(), space_.options(), space_.points());
   extended.set_references(space_.references());
@@ -100,11 +100,23 @@ ClipSpace ClipSpace::extend(const PreparedSource& clips, const Progress& progres
   return {std::move(extended), travel_scale_};
 }
 
-std::vector<float> ClipSpace::vector_of(const ClipCurves& curves) const {
-  SampleMatrix samples = clip_samples(space_, curves);
-  samples.leftCols<3>() *= travel_scale_;
-  const ScoreMatrix scores = space_.scores(samples);
-  return {scores.data(), scores.data() + scores.size()};
+std::vector<float> ClipSpace::vector_of(const ClipCurves& curves, const Compute& compute) const {
+  const ClipCurves* const one = &curves;
+  return std::move(vectors_of(std::span(&one, 1), compute).front());
+}
+
+std::vector<std::vector<float>> ClipSpace::vectors_of(std::span<const ClipCurves* const> clips,
+                                                      const Compute& compute) const {
+  std::vector<SampleMatrix> samples(clips.size());
+  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t i) {
+    samples[i] = clip_samples(space_, *clips[i]);
+    samples[i].leftCols<3>() *= travel_scale_;
+  });
+  std::vector<std::vector<float>> out;
+  for (const ScoreMatrix& scores : space_.scores(samples, compute)) {
+    out.emplace_back(scores.data(), scores.data() + scores.size());
+  }
+  return out;
 }
 
 Bytes ClipSpace::pack() const {

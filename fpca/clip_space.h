@@ -29,10 +29,12 @@ class ClipSpace {
  public:
   // From all clips of a library, on the side of `references` (MotionSpace::references).
   [[nodiscard]] static ClipSpace build(const PreparedSource& clips, const Eigen::Matrix4Xd& references,
-                                       const ClipSpaceOptions& options = {}, const Progress& progress = {});
+                                       const ClipSpaceOptions& options = {}, const Compute& compute = {},
+                                       const Progress& progress = {});
 
   // The same with more clips: their moments merged in, functions found anew, the travel's scale kept.
-  [[nodiscard]] ClipSpace extend(const PreparedSource& clips, const Progress& progress = {}) const;
+  [[nodiscard]] ClipSpace extend(const PreparedSource& clips, const Compute& compute = {},
+                                 const Progress& progress = {}) const;
 
   [[nodiscard]] const MotionSpace& space() const { return space_; }
   [[nodiscard]] double travel_scale() const { return travel_scale_; }
@@ -41,7 +43,10 @@ class ClipSpace {
   }
 
   // [function][curve], for curves on any side.
-  [[nodiscard]] std::vector<float> vector_of(const ClipCurves& curves) const;
+  [[nodiscard]] std::vector<float> vector_of(const ClipCurves& curves, const Compute& compute = {}) const;
+  // Those of several clips, projected together.
+  [[nodiscard]] std::vector<std::vector<float>> vectors_of(std::span<const ClipCurves* const> clips,
+                                                           const Compute& compute = {}) const;
 
   [[nodiscard]] Bytes pack() const;
   [[nodiscard]] static ClipSpace unpack(std::span<const std::byte> bytes, const std::string& source);

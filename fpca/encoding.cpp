@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include <tbb/parallel_for.h>
+
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/cut_join.h"
 #include "kinespace/fpca/left_out.h"
@@ -50,20 +52,17 @@ SampleMatrix decode_frames(const RegisteredSpace& all_sets, const EncodedSequenc
   return out;
 }
 
-// The scores of a sequence. A recording may go to and fro from one frame to the next, faster than the grid follows: then
-// what its frames miss is given to the samples, until it is there or no nearer.
-ScoreMatrix scores_of(const RegisteredSpace& space, const SampleMatrix& values, const RunSampler& sampler,
-                      EncodedSequence sequence, double rate_hz, const Compute& compute) {
+// A recording may go to and fro from one frame to the next, faster than the grid follows: then what the frames of a
+// sequence miss is given to its scores, until it is there or no nearer.
+void reach_frames(const RegisteredSpace& space, const SampleMatrix& values, double rate_hz, EncodedSequence& sequence) {
   constexpr double enough = 0.002;  // of a quaternion
   constexpr int most_rounds = 4;
   const MotionSpace& set = space.of(sequence.cycles);
   const int last = sequence.last - sequence.first;
-  SampleMatrix samples = sampler.sample(sequence.first, sequence.last, sequence.warp, set.points());
-  ScoreMatrix best = set.scores(samples, compute);
-  if (set.options().smooth) return best;  // what it misses is noise
+  if (set.options().smooth || last < 2) return;  // what a smoothed space misses is noise
+  ScoreMatrix best = sequence.scores;
   double least = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < most_rounds && last > 1; ++round) {
-    sequence.scores = round == 0 ? best : set.scores(samples, compute);
+  for (int round = 0; round < most_rounds; ++round) {
     SampleMatrix missing = values.middleRows(sequence.first, last + 1) -
                            decode_frames(space, sequence, Eigen::Vector3d::Zero(), rate_hz, -1);
     missing.leftCols<travel_curves>().setZero();
@@ -74,9 +73,10 @@ ScoreMatrix scores_of(const RegisteredSpace& space, const SampleMatrix& values, 
     best = sequence.scores;
     least = most;
     if (most < enough) break;
-    samples += RunSampler(missing, Run{{0, last}}, rate_hz).sample(0, last, sequence.warp, set.points());
+    const SampleMatrix change = RunSampler(missing, Run{{0, last}}, rate_hz).sample(0, last, sequence.warp, set.points());
+    sequence.scores += set.scores(change) - set.scores(SampleMatrix::Zero(change.rows(), change.cols()));
   }
-  return best;
+  sequence.scores = std::move(best);
 }
 
 // Takes out of a sequence what does not fit at the cuts before and after it; null: there is none.
@@ -145,8 +145,12 @@ SampleMatrix RunSampler::sample(int first, int last, const Warp& warp, int point
   return out;
 }
 
-EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
-                   const std::vector<Warp>& warps, const Compute& compute) {
+namespace {
+
+// A clip but for its scores; hands over the samples of each sequence, in order.
+template <typename Take>
+EncodedClip encode_with(const RegisteredSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
+                        const std::vector<Warp>& warps, const Take& take) {
   EncodedClip out{.name = curves.name,
                   .rate_hz = curves.rate_hz,
                   .frames = curves.frames(),
@@ -162,11 +166,108 @@ EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const
       if (!warps.empty()) sequence.warp = warps.at(warp++);
       sequence.travel =
           (curves.values.row(sequence.last) - curves.values.row(sequence.first)).head<3>().transpose().cast<float>();
-      sequence.scores = scores_of(space, curves.values, sampler, sequence, curves.rate_hz, compute);
-      space.of(sequence.cycles).drop_needless(sequence.scores);
+      const int points = space.of(sequence.cycles).points();
+      take(sequence.cycles, sampler.sample(sequence.first, sequence.last, sequence.warp, points));
       encoded.sequences.push_back(std::move(sequence));
     }
   }
+  return out;
+}
+
+// Samples of sequences that wait for their scores, which come in the order of the sequences.
+class ScoreQueue {
+ public:
+  ScoreQueue(const RegisteredSpace& space, const Compute& compute)
+      : space_(space), compute_(compute), waiting_(space.sets().size()) {}
+
+  void add(int cycles, SampleMatrix&& samples) {
+    // The processor gains nothing from many at a time.
+    const std::size_t most_bytes = compute_.choice() == "cpu" ? 0 : std::size_t{32} << 20;
+    Waiting& set = waiting_[static_cast<std::size_t>(cycles)];
+    bytes_ += static_cast<std::size_t>(samples.size()) * sizeof(double);
+    set.places.push_back(scores_.size());
+    set.samples.push_back(std::move(samples));
+    scores_.emplace_back();
+    if (bytes_ > most_bytes) work_off();
+  }
+
+  [[nodiscard]] std::vector<ScoreMatrix> finish() {
+    work_off();
+    return std::move(scores_);
+  }
+
+ private:
+  struct Waiting {
+    std::vector<SampleMatrix> samples;
+    std::vector<std::size_t> places;
+  };
+
+  void work_off() {
+    for (std::size_t set = 0; set < waiting_.size(); ++set) {
+      Waiting& of_set = waiting_[set];
+      if (of_set.samples.empty()) continue;
+      std::vector<ScoreMatrix> found = space_.of(static_cast<int>(set)).scores(of_set.samples, compute_);
+      for (std::size_t i = 0; i < found.size(); ++i) scores_[of_set.places[i]] = std::move(found[i]);
+      of_set = {};
+    }
+    bytes_ = 0;
+  }
+
+  const RegisteredSpace& space_;
+  const Compute& compute_;
+  std::vector<Waiting> waiting_;  // by set
+  std::size_t bytes_ = 0;
+  std::vector<ScoreMatrix> scores_;
+};
+
+// Takes the clip's scores off the list, from `next` on.
+void take_scores(EncodedClip& clip, std::vector<ScoreMatrix>& scores, std::size_t& next) {
+  for (EncodedRun& run : clip.runs) {
+    for (EncodedSequence& sequence : run.sequences) sequence.scores = std::move(scores[next++]);
+  }
+}
+
+void complete_scores(const RegisteredSpace& space, const ClipCurves& curves, EncodedClip& clip) {
+  for (EncodedRun& run : clip.runs) {
+    for (EncodedSequence& sequence : run.sequences) {
+      reach_frames(space, curves.values, curves.rate_hz, sequence);
+      space.of(sequence.cycles).drop_needless(sequence.scores);
+    }
+  }
+}
+
+}  // namespace
+
+EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
+                   const std::vector<Warp>& warps, const Compute& compute) {
+  ScoreQueue queue(space, compute);
+  EncodedClip out = encode_with(space, curves, runs, warps,
+                                [&](int cycles, SampleMatrix&& samples) { queue.add(cycles, std::move(samples)); });
+  std::vector<ScoreMatrix> scores = queue.finish();
+  std::size_t next = 0;
+  take_scores(out, scores, next);
+  complete_scores(space, curves, out);
+  return out;
+}
+
+std::vector<EncodedClip> encode(const RegisteredSpace& space, std::span<const ClipToEncode> clips,
+                                const Compute& compute) {
+  using OfClip = std::vector<std::pair<int, SampleMatrix>>;
+  std::vector<EncodedClip> out(clips.size());
+  std::vector<OfClip> samples(clips.size());
+  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t i) {
+    out[i] = encode_with(space, *clips[i].curves, clips[i].runs, clips[i].warps,
+                         [&](int cycles, SampleMatrix&& of) { samples[i].emplace_back(cycles, std::move(of)); });
+  });
+  ScoreQueue queue(space, compute);
+  for (OfClip& of_clip : samples) {
+    for (auto& [cycles, of_sequence] : of_clip) queue.add(cycles, std::move(of_sequence));
+    of_clip.clear();
+  }
+  std::vector<ScoreMatrix> scores = queue.finish();
+  std::size_t next = 0;
+  for (EncodedClip& clip : out) take_scores(clip, scores, next);
+  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) { complete_scores(space, *clips[i].curves, out[i]); });
   return out;
 }
 
@@ -222,7 +323,8 @@ ClipCurves decode(const RegisteredSpace& space, const EncodedClip& clip, int n, 
   return ClipDecoder(space).decode(clip, n, options);
 }
 
-EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip, const SequenceOptions& sequences) {
+EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip, const SequenceOptions& sequences,
+                        const Compute& compute) {
   if (!clip.skeleton.same_tree(space.skeleton())) {
     throw Error(ErrorKind::bad_input, {.file = clip.name,
                                        .found = "a skeleton that is not that of the motion space",
@@ -231,7 +333,8 @@ EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip, const Se
   ClipCurves curves = clip_curves(clip);
   const std::vector<Run> runs = SequenceCutter(clip, sequences).cut(curves, clip.skeleton);
   space.apply_references(curves.values);
-  return encode(space, curves, apply_choice(runs, choose_rests(space, curves.values, runs, curves.rate_hz)));
+  const RestChoice at_rests = choose_rests(space, curves.values, runs, curves.rate_hz, compute);
+  return encode(space, curves, apply_choice(runs, at_rests), {}, compute);
 }
 
 }  // namespace kinespace

@@ -101,6 +101,16 @@ class RunSampler {
 [[nodiscard]] EncodedClip encode(const RegisteredSpace& space, const ClipCurves& curves, const std::vector<Run>& runs,
                                  const std::vector<Warp>& warps = {}, const Compute& compute = {});
 
+// Many clips at once: the sequences of all of them go through each set's functions together, which is what a device is
+// for. All their samples are in memory at once, about a kilobyte a curve and second.
+struct ClipToEncode {
+  const ClipCurves* curves = nullptr;
+  std::vector<Run> runs;
+  std::vector<Warp> warps;
+};
+[[nodiscard]] std::vector<EncodedClip> encode(const RegisteredSpace& space, std::span<const ClipToEncode> clips,
+                                              const Compute& compute = {});
+
 // At level of detail n (all when n < 0).
 [[nodiscard]] ClipCurves decode(const RegisteredSpace& space, const EncodedClip& clip, int n = -1,
                                 const JoinOptions& options = {});
@@ -134,6 +144,6 @@ class ClipDecoder {
 // A clip outside the library, into the space: curves, sides, cuts, vectors. Throws Error{bad_input} for another
 // skeleton.
 [[nodiscard]] EncodedClip encode_clip(const RegisteredSpace& space, const Clip& clip,
-                                      const SequenceOptions& sequences = {});
+                                      const SequenceOptions& sequences = {}, const Compute& compute = {});
 
 }  // namespace kinespace

@@ -82,12 +82,14 @@ CurveMatrix FunctionalPca::reconstruct(const CurveView& scores) const {
   return out;
 }
 
-FunctionalPca fit_functional_pca(const CurveView& curves, const FpcaOptions& options, Domain domain) {
-  return FunctionalPcaWorkspace(static_cast<int>(curves.cols()), options, domain).fit(curves);
+FunctionalPca fit_functional_pca(const CurveView& curves, const FpcaOptions& options, Domain domain,
+                                 const Compute& compute) {
+  return FunctionalPcaWorkspace(static_cast<int>(curves.cols()), options, domain).fit(curves, compute);
 }
 
-FunctionalPca fit_functional_pca(const CurveMoments& moments, const FpcaOptions& options, Domain domain) {
-  return FunctionalPcaWorkspace(moments.points(), options, domain).fit(moments);
+FunctionalPca fit_functional_pca(const CurveMoments& moments, const FpcaOptions& options, Domain domain,
+                                 const Compute& compute) {
+  return FunctionalPcaWorkspace(moments.points(), options, domain).fit(moments, compute);
 }
 
 // FunctionalPcaWorkspace: the steps of a fit, in the order PACE takes them.
@@ -158,7 +160,7 @@ double positive_noise(double estimate) {
 struct FunctionalPcaWorkspace::Parts {
   Parts(int point_count, const FpcaOptions& fit_options, Domain fit_domain);
 
-  FunctionalPca fit(const CurveMoments& moments, double second_difference_variance);
+  FunctionalPca fit(const CurveMoments& moments, double second_difference_variance, const Compute& compute);
 
   int points;
   int work_points;
@@ -172,9 +174,10 @@ struct FunctionalPcaWorkspace::Parts {
   Eigen::MatrixXd raw, problem;  // work space
 
  private:
-  void find_mean(const CurveMoments& moments, FunctionalPca& out);
-  void find_covariance(const CurveMoments& moments, double second_difference_variance, FunctionalPca& out);
-  void find_noise(FunctionalPca& out);
+  void find_mean(const CurveMoments& moments, const Compute& compute, FunctionalPca& out);
+  void find_covariance(const CurveMoments& moments, double second_difference_variance, const Compute& compute,
+                       FunctionalPca& out);
+  void find_noise(const Compute& compute, FunctionalPca& out);
   void decompose(FunctionalPca& out);
   [[nodiscard]] int positive_values(const FunctionalPca& out) const;
   // How many functions to give, and how many the fitted covariance is made of.
@@ -213,7 +216,8 @@ FunctionalPcaWorkspace::Parts::Parts(int point_count, const FpcaOptions& fit_opt
   }
 }
 
-FunctionalPca FunctionalPcaWorkspace::Parts::fit(const CurveMoments& moments, double second_difference_variance) {
+FunctionalPca FunctionalPcaWorkspace::Parts::fit(const CurveMoments& moments, double second_difference_variance,
+                                                 const Compute& compute) {
   if (moments.count() < 1) throw Error(ErrorKind::bad_input, {.found = "no curves", .expected = "at least one"});
   if (moments.points() != points) {
     throw Error(ErrorKind::usage, {.found = "curves of " + std::to_string(moments.points()) + " points",
@@ -225,8 +229,8 @@ FunctionalPca FunctionalPcaWorkspace::Parts::fit(const CurveMoments& moments, do
   out.curve_count = moments.count();
   out.grid = Eigen::VectorXd::LinSpaced(work_points, domain.start, work_points > 1 ? domain.end : domain.start);
   out.weights = trapezoid_weights(points, domain.length());
-  find_mean(moments, out);
-  find_covariance(moments, second_difference_variance, out);
+  find_mean(moments, compute, out);
+  find_covariance(moments, second_difference_variance, compute, out);
   decompose(out);
   const auto [count, kept] = choose_counts(out);
   const Eigen::MatrixXd functions = scaled_functions(kept, out);
@@ -237,12 +241,12 @@ FunctionalPca FunctionalPcaWorkspace::Parts::fit(const CurveMoments& moments, do
   return out;
 }
 
-void FunctionalPcaWorkspace::Parts::find_mean(const CurveMoments& moments, FunctionalPca& out) {
+void FunctionalPcaWorkspace::Parts::find_mean(const CurveMoments& moments, const Compute& compute, FunctionalPca& out) {
   out.observed_mean = moments.mean();
   if (options.mean == MeanEstimate::smooth) {
     const Eigen::VectorXd& m = moments.mean();
     out.observed_mean = to_eigen(local_linear_line({m.data(), static_cast<std::size_t>(m.size())}, {}, options.kernel,
-                                                   options.mean_bandwidth, places));
+                                                   options.mean_bandwidth, places, compute));
   } else if (options.mean == MeanEstimate::spline) {
     const Eigen::VectorXd& m = moments.mean();
     const double noise = std::max(second_difference_noise(moments), 0.0) / static_cast<double>(moments.count());
@@ -256,14 +260,14 @@ void FunctionalPcaWorkspace::Parts::find_mean(const CurveMoments& moments, Funct
 }
 
 void FunctionalPcaWorkspace::Parts::find_covariance(const CurveMoments& moments, double second_difference_variance,
-                                                    FunctionalPca& out) {
+                                                    const Compute& compute, FunctionalPca& out) {
   const double n = static_cast<double>(moments.count());
   if (options.smooth_covariance) {
     moments.covariance(n, raw);
     const Eigen::VectorXd off = moments.mean() - out.observed_mean;
     if (options.mean != MeanEstimate::cross_sectional) raw += off * off.transpose();
-    surface->smooth(raw, out.covariance);
-    if (options.estimate_noise) find_noise(out);
+    surface->smooth(raw, out.covariance, compute);
+    if (options.estimate_noise) find_noise(compute, out);
     return;
   }
   moments.covariance(std::max(n - 1, 1.0), out.covariance);
@@ -279,10 +283,10 @@ void FunctionalPcaWorkspace::Parts::find_covariance(const CurveMoments& moments,
 }
 
 // Diagonal with noise less the same without, over the middle half of the domain, where no window is cut.
-void FunctionalPcaWorkspace::Parts::find_noise(FunctionalPca& out) {
+void FunctionalPcaWorkspace::Parts::find_noise(const Compute& compute, FunctionalPca& out) {
   const Eigen::VectorXd diagonal = raw.diagonal();
   const auto with = local_linear_line({diagonal.data(), static_cast<std::size_t>(diagonal.size())}, {}, options.kernel,
-                                      options.covariance_bandwidth, middle);
+                                      options.covariance_bandwidth, middle, compute);
   const auto without = rotated_quadratic_ridge(raw, options.kernel, options.covariance_bandwidth, middle);
   const auto rows = static_cast<Eigen::Index>(middle.size());
   out.noise_diagonal.resize(rows, 3);
@@ -401,16 +405,16 @@ FunctionalPcaWorkspace::~FunctionalPcaWorkspace() = default;
 FunctionalPcaWorkspace::FunctionalPcaWorkspace(FunctionalPcaWorkspace&&) noexcept = default;
 FunctionalPcaWorkspace& FunctionalPcaWorkspace::operator=(FunctionalPcaWorkspace&&) noexcept = default;
 
-FunctionalPca FunctionalPcaWorkspace::fit(const CurveView& curves) {
+FunctionalPca FunctionalPcaWorkspace::fit(const CurveView& curves, const Compute& compute) {
   CurveMoments moments(parts_->points);
   moments.add(curves);
   const bool from_differences = parts_->options.estimate_noise && !parts_->options.smooth_covariance;
-  return parts_->fit(moments, from_differences && curves.rows() > 0 ? second_difference_noise(curves) : 0);
+  return parts_->fit(moments, from_differences && curves.rows() > 0 ? second_difference_noise(curves) : 0, compute);
 }
 
-FunctionalPca FunctionalPcaWorkspace::fit(const CurveMoments& moments) {
+FunctionalPca FunctionalPcaWorkspace::fit(const CurveMoments& moments, const Compute& compute) {
   const bool from_differences = parts_->options.estimate_noise && !parts_->options.smooth_covariance;
-  return parts_->fit(moments, from_differences && moments.count() > 0 ? second_difference_noise(moments) : 0);
+  return parts_->fit(moments, from_differences && moments.count() > 0 ? second_difference_noise(moments) : 0, compute);
 }
 
 }  // namespace kinespace

@@ -136,10 +136,11 @@ class FunctionalPcaWorkspace {
   FunctionalPcaWorkspace(const FunctionalPcaWorkspace&) = delete;
   FunctionalPcaWorkspace& operator=(const FunctionalPcaWorkspace&) = delete;
 
-  // One curve a row. Throws Error{bad_input} for no curves or values that are not finite.
-  [[nodiscard]] FunctionalPca fit(const CurveView& curves);
+  // One curve a row. Throws Error{bad_input} for no curves or values that are not finite. What is smoothed is so on the
+  // device of `compute` (kernels/local_linear.h: within 1e-11 of the largest value, 1e-4 on one without double).
+  [[nodiscard]] FunctionalPca fit(const CurveView& curves, const Compute& compute = {});
   // The same from moments; the noise variance of unsmoothed curves then comes from their scatter, a few digits coarser.
-  [[nodiscard]] FunctionalPca fit(const CurveMoments& moments);
+  [[nodiscard]] FunctionalPca fit(const CurveMoments& moments, const Compute& compute = {});
 
  private:
   struct Parts;
@@ -148,9 +149,9 @@ class FunctionalPcaWorkspace {
 
 // One-off use.
 [[nodiscard]] FunctionalPca fit_functional_pca(const CurveView& curves, const FpcaOptions& options = {},
-                                               Domain domain = {});
+                                               Domain domain = {}, const Compute& compute = {});
 [[nodiscard]] FunctionalPca fit_functional_pca(const CurveMoments& moments, const FpcaOptions& options = {},
-                                               Domain domain = {});
+                                               Domain domain = {}, const Compute& compute = {});
 
 // The weights of the trapezoid rule on `points` equidistant points over a length; one point weighs 1.
 [[nodiscard]] Eigen::VectorXd trapezoid_weights(int points, double length);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/conditional_scores.h"
@@ -44,6 +45,12 @@ SampleMatrix lines_between_ends(const SampleMatrix& samples) {
   SampleMatrix out = s * (samples.bottomRows(1) - samples.topRows(1));
   out.rowwise() += samples.row(0);
   return out;
+}
+
+// The two rows of scores that are the ends of the curves.
+void write_ends(const SampleMatrix& samples, ScoreMatrix& scores) {
+  scores.row(0) = samples.row(0).cast<float>();
+  scores.row(1) = samples.row(samples.rows() - 1).cast<float>();
 }
 
 // Moments of what curves are above the lines between their ends. That is linear in the curves, B f with
@@ -177,6 +184,14 @@ int MotionSpace::group_of(int curve) const {
   return 0;
 }
 
+std::vector<int> MotionSpace::curves_of_group(int group) const {
+  std::vector<int> out;
+  for (int c = 0; c < curves(); ++c) {
+    if (group_of(c) == group) out.push_back(c);
+  }
+  return out;
+}
+
 std::vector<CurveMoments> MotionSpace::empty_moments() const {
   return std::vector<CurveMoments>(static_cast<std::size_t>(group_count()), CurveMoments(points_));
 }
@@ -184,12 +199,8 @@ std::vector<CurveMoments> MotionSpace::empty_moments() const {
 void MotionSpace::accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments,
                              const Compute& compute) const {
   assert(moments.size() == static_cast<std::size_t>(group_count()));
-  std::vector<int> members;
   for (int g = 0; g < group_count(); ++g) {
-    members.clear();
-    for (int c = 0; c < curves(); ++c) {
-      if (group_of(c) == g) members.push_back(c);
-    }
+    const std::vector<int> members = curves_of_group(g);
     CurveMatrix block(static_cast<Eigen::Index>(samples.size() * members.size()), points_);
     Eigen::Index row = 0;
     for (const SampleMatrix& s : samples) {
@@ -199,16 +210,16 @@ void MotionSpace::accumulate(std::span<const SampleMatrix> samples, std::vector<
   }
 }
 
-void MotionSpace::fit(std::vector<CurveMoments> moments) {
+void MotionSpace::fit(std::vector<CurveMoments> moments, const Compute& compute) {
   groups_.clear();
   FunctionalPcaWorkspace workspace(points_, fpca_options(options_));
   for (const CurveMoments& m : moments) {
     if (m.count() == 0) {
       groups_.push_back({Eigen::VectorXd::Zero(points_), Eigen::MatrixXd(points_, 0), Eigen::VectorXd(), 0, 0});
     } else if (options_.pinned) {
-      groups_.push_back(fit_pinned(m));
+      groups_.push_back(fit_pinned(m));  // without smoothing: nothing for a device
     } else {
-      FunctionalPca pca = workspace.fit(m);
+      FunctionalPca pca = workspace.fit(m, compute);
       const double variance = pca.all_eigenvalues.cwiseMax(0).sum();
       const double left = variance - pca.eigenvalues.sum();
       groups_.push_back({pca.observed_mean, pca.observed_functions, pca.eigenvalues, variance, left});
@@ -238,17 +249,28 @@ void FunctionGroup::expect_scores(double noise_variance) {
 }
 
 ScoreMatrix MotionSpace::scores(const SampleMatrix& samples, const Compute& compute) const {
-  return scores_by(ScoreKind::conditional, samples, compute);
+  return std::move(scores(std::span(&samples, 1), compute).front());
+}
+
+std::vector<ScoreMatrix> MotionSpace::scores(std::span<const SampleMatrix> samples, const Compute& compute) const {
+  const auto count = static_cast<double>(samples.size());
+  const double flops = 2.0 * count * points_ * curves() * functions();
+  if (flops > 0 && compute.device_for(KernelFamily::projection, flops) != nullptr) {
+    return scores_on_device(samples, compute);
+  }
+  std::vector<ScoreMatrix> out(samples.size());
+  tbb::parallel_for(std::size_t{0}, samples.size(),
+                    [&](std::size_t i) { out[i] = scores_by(ScoreKind::conditional, samples[i]); });
+  return out;
 }
 
 // Conditional ones where the space has them.
-ScoreMatrix MotionSpace::scores_by(ScoreKind kind, const SampleMatrix& samples, const Compute& compute) const {
+ScoreMatrix MotionSpace::scores_by(ScoreKind kind, const SampleMatrix& samples) const {
   assert(samples.rows() == points_ && samples.cols() == curves());
   ScoreMatrix out = ScoreMatrix::Zero(rows(), curves());
   SampleMatrix above;  // what functions describe, where it is not the samples themselves
   if (options_.pinned) {
-    out.row(0) = samples.row(0).cast<float>();
-    out.row(1) = samples.row(points_ - 1).cast<float>();
+    write_ends(samples, out);
     above = samples - lines_between_ends(samples);
   }
   const SampleMatrix& curves_of = options_.pinned ? above : samples;
@@ -258,13 +280,6 @@ ScoreMatrix MotionSpace::scores_by(ScoreKind kind, const SampleMatrix& samples, 
     const bool expected = g.noise && kind == ScoreKind::conditional;
     Eigen::MatrixXd projector = (g.functions.array().colwise() * weights_.array()).matrix();
     if (expected) projector = g.conditional.transpose();
-    const double flops = 2.0 * static_cast<double>(projector.size()) * curves();
-    if (compute.device_for(KernelFamily::projection, flops) != nullptr) {
-      const RowMatrix<float> curve_rows = curves_of.transpose().cast<float>();
-      const RowMatrix<float> matrix = projector.cast<float>();
-      of_functions = project(curve_rows, g.mean.cast<float>(), matrix, compute).transpose();
-      return out;
-    }
     const SampleMatrix centred = curves_of.colwise() - g.mean;
     of_functions = (projector.transpose() * centred).cast<float>();
     return out;
@@ -294,6 +309,36 @@ void MotionSpace::drop_needless(ScoreMatrix& scores) const {
     if (may_go < 0) return;
     scores.row(row).setZero();
   }
+}
+
+std::vector<ScoreMatrix> MotionSpace::scores_on_device(std::span<const SampleMatrix> samples,
+                                                       const Compute& compute) const {
+  std::vector<ScoreMatrix> out(samples.size(), ScoreMatrix::Zero(rows(), curves()));
+  const Eigen::Index ends = rows() - functions();
+  for (int group = 0; group < group_count(); ++group) {
+    const std::vector<int> members = curves_of_group(group);
+    const FunctionGroup& g = groups_[static_cast<std::size_t>(group)];
+    RowMatrix<float> curves(static_cast<Eigen::Index>(samples.size() * members.size()), points_);
+    Eigen::Index row = 0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      assert(samples[i].rows() == points_ && samples[i].cols() == this->curves());
+      if (options_.pinned && group == 0) write_ends(samples[i], out[i]);
+      const SampleMatrix lines = options_.pinned ? lines_between_ends(samples[i]) : SampleMatrix();
+      for (const int c : members) {
+        curves.row(row) = samples[i].col(c).transpose().cast<float>();
+        if (options_.pinned) curves.row(row) = (samples[i].col(c) - lines.col(c)).transpose().cast<float>();
+        ++row;
+      }
+    }
+    RowMatrix<float> projector = (g.functions.array().colwise() * weights_.array()).matrix().cast<float>();
+    if (g.noise) projector = g.conditional.transpose().cast<float>();
+    const RowMatrix<float> found = project(curves, g.mean.cast<float>(), projector, compute);
+    row = 0;
+    for (ScoreMatrix& scores : out) {
+      for (const int c : members) scores.col(c).segment(ends, found.cols()) = found.row(row++).transpose();
+    }
+  }
+  return out;
 }
 
 void MotionSpace::add_ends(const ScoreMatrix& scores, SampleMatrix& samples) const {
@@ -326,7 +371,7 @@ SampleMatrix MotionSpace::samples(const ScoreMatrix& scores, int n) const {
 ScoreMatrix MotionSpace::transfer(const ScoreMatrix& scores, const MotionSpace& from) const {
   assert(from.points_ == points_ && from.curves() == curves());
   // What was reconstructed holds no noise any more: integrals say it exactly.
-  return scores_by(ScoreKind::integration, from.samples(scores), {});
+  return scores_by(ScoreKind::integration, from.samples(scores));
 }
 
 Eigen::VectorXd MotionSpace::truncation_error(const ScoreMatrix& scores, int n) const {

@@ -108,11 +108,14 @@ class MotionSpace {
   void accumulate(std::span<const SampleMatrix> samples, std::vector<CurveMoments>& moments,
                   const Compute& compute = {}) const;
   // Finds the functions; none where there are no curves. The moments stay with the space, so that it can be extended.
-  void fit(std::vector<CurveMoments> moments);
+  void fit(std::vector<CurveMoments> moments, const Compute& compute = {});
 
   // T x C samples to scores (rows() x C) and back, at level of detail n (all when n < 0 or too large). Scores of a
   // smoothed space are expected ones: `samples` of them are the curves less their noise.
   [[nodiscard]] ScoreMatrix scores(const SampleMatrix& samples, const Compute& compute = {}) const;
+  // The same for many sequences: on an OpenCL device one product for each group of curves, in float.
+  [[nodiscard]] std::vector<ScoreMatrix> scores(std::span<const SampleMatrix> samples,
+                                                const Compute& compute = {}) const;
   [[nodiscard]] SampleMatrix samples(const ScoreMatrix& scores, int n = -1) const;
   // Sets to 0 the last functions' scores of a sequence, as many as together hold no more than half of (1 -
   // variance_share) of the variance; none where a count of functions was asked for, and in a smoothed space.
@@ -143,8 +146,11 @@ class MotionSpace {
   [[nodiscard]] double movement_covered() const;
 
  private:
+  [[nodiscard]] std::vector<int> curves_of_group(int group) const;
   [[nodiscard]] FunctionGroup fit_pinned(const CurveMoments& moments) const;
-  [[nodiscard]] ScoreMatrix scores_by(ScoreKind kind, const SampleMatrix& samples, const Compute& compute) const;
+  [[nodiscard]] ScoreMatrix scores_by(ScoreKind kind, const SampleMatrix& samples) const;
+  [[nodiscard]] std::vector<ScoreMatrix> scores_on_device(std::span<const SampleMatrix> samples,
+                                                          const Compute& compute) const;
   void add_ends(const ScoreMatrix& scores, SampleMatrix& samples) const;
 
   friend Bytes pack_space(const MotionSpace& space);

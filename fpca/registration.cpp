@@ -20,9 +20,9 @@ using Costs = std::array<Cost, levels_compared.size()>;
 
 // The stretch of a run between two cuts, as one sequence.
 void add_sequence(const MotionSpace& set, const RunSampler& sampler, int first, int last,
-                  const Eigen::RowVectorXd& weights, Costs& costs) {
+                  const Eigen::RowVectorXd& weights, const Compute& compute, Costs& costs) {
   const SampleMatrix samples = sampler.sample(first, last, Warp(), set.points());
-  const ScoreMatrix scores = set.scores(samples);
+  const ScoreMatrix scores = set.scores(samples, compute);
   for (std::size_t i = 0; i < costs.size(); ++i) {
     const SampleMatrix left = (samples - set.samples(scores, levels_compared[i])).array().rowwise() * weights.array();
     costs[i].left += (last - first) * left.squaredNorm() / static_cast<double>(left.rows());
@@ -72,7 +72,7 @@ Run chosen_run(const Run& run, std::span<const char> at_rests) {
 }  // namespace
 
 RestChoice choose_rests(const RegisteredSpace& space, const SampleMatrix& values, const std::vector<Run>& runs,
-                        double rate_hz) {
+                        double rate_hz, const Compute& compute) {
   const Eigen::RowVectorXd weights = curve_weights(space.skeleton());
   RestChoice out;
   for (const Run& run : runs) {
@@ -86,10 +86,11 @@ RestChoice choose_rests(const RegisteredSpace& space, const SampleMatrix& values
       Costs cycles{};
       Costs rests{};
       for (int i = stretch.sequence; i < stretch.sequence + stretch.count; ++i) {
-        add_sequence(space.of(run.cycles_of(i)), sampler, run.first_frame(i), run.last_frame(i), weights, cycles);
+        add_sequence(space.of(run.cycles_of(i)), sampler, run.first_frame(i), run.last_frame(i), weights, compute,
+                     cycles);
       }
       for (std::size_t i = 0; i + 1 < stretch.cuts.size(); ++i) {
-        add_sequence(space.plain(), sampler, stretch.cuts[i], stretch.cuts[i + 1], weights, rests);
+        add_sequence(space.plain(), sampler, stretch.cuts[i], stretch.cuts[i + 1], weights, compute, rests);
       }
       out.push_back(rests_win(cycles, rests) ? 1 : 0);
     }

@@ -24,7 +24,7 @@ using RestChoice = std::vector<char>;
 // `values`: of all frames, on the space's side. Stretches with sequences that the space has no functions for are cut at
 // rests.
 [[nodiscard]] RestChoice choose_rests(const RegisteredSpace& space, const SampleMatrix& values,
-                                      const std::vector<Run>& runs, double rate_hz);
+                                      const std::vector<Run>& runs, double rate_hz, const Compute& compute = {});
 
 // The runs as they were chosen; nothing is left to choose.
 [[nodiscard]] std::vector<Run> apply_choice(const std::vector<Run>& runs, const RestChoice& at_rests);

@@ -153,7 +153,7 @@ struct SequenceTable {
 };
 
 SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace& space, int functions,
-                                 const Progress& progress) {
+                                 const Compute& compute, const Progress& progress) {
   SequenceTable table;
   const RegisteredSpace one_set(space);
   std::vector<Eigen::VectorXf> vectors;
@@ -162,11 +162,20 @@ SequenceTable tabulate_sequences(const PreparedSource& clips, const MotionSpace&
       clips, progress, "group",
       [&](int, PreparedClip& clip) {
         Vectors out;
-        visit_samples(one_set, clip, {}, [&](std::size_t, const SampleMatrix& samples) {
-          const ScoreMatrix scores = space.scores(samples);
-          const Eigen::Index n = std::min<Eigen::Index>(functions, scores.rows());
-          out.emplace_back(Eigen::Map<const Eigen::VectorXf>(scores.data(), n * scores.cols()));
+        std::vector<SampleMatrix> waiting;
+        const auto project = [&] {
+          for (const ScoreMatrix& scores : space.scores(waiting, compute)) {
+            const Eigen::Index n = std::min<Eigen::Index>(functions, scores.rows());
+            out.emplace_back(Eigen::Map<const Eigen::VectorXf>(scores.data(), n * scores.cols()));
+          }
+          waiting.clear();
+        };
+        visit_samples(one_set, clip, {}, [&](std::size_t, SampleMatrix&& samples) {
+          const auto size = static_cast<std::size_t>(samples.size()) * sizeof(double);
+          waiting.push_back(std::move(samples));
+          if (waiting.size() * size >= bytes_of_samples) project();
         });
+        if (!waiting.empty()) project();
         return out;
       },
       [&](int i, Vectors& of_clip) {
@@ -232,7 +241,7 @@ std::vector<std::vector<Warp>> propose_warps(const PreparedSource& clips, const 
                                              const Progress& progress) {
   std::vector<std::vector<Warp>> out(static_cast<std::size_t>(clips.count));
   if (options.templates == 0) return out;
-  const SequenceTable table = tabulate_sequences(clips, space, 3, progress);
+  const SequenceTable table = tabulate_sequences(clips, space, 3, compute, progress);
   if (table.clip.empty()) return out;
   const TemplateGroups groups = group_sequences(table.vectors, options.templates);
   const FeatureSet templates = template_features(clips, table, groups, progress);
@@ -407,16 +416,16 @@ RegisteredSpace empty_space(const Survey& found, const MotionSpaceOptions& optio
 
 // Finds the functions of every set. Where no motion was cut at rests, the set for it is made of the cycles, so that
 // other clips can be described at all.
-RegisteredSpace fit_sets(const RegisteredSpace& space, SetMoments moments) {
+RegisteredSpace fit_sets(const RegisteredSpace& space, SetMoments moments, const Compute& compute) {
   std::vector<MotionSpace> sets = space.sets();
-  for (std::size_t set = 1; set < sets.size(); ++set) sets[set].fit(std::move(moments[set]));
+  for (std::size_t set = 1; set < sets.size(); ++set) sets[set].fit(std::move(moments[set]), compute);
   if (moments[0][0].count() == 0) {
     const auto first = std::find_if(sets.begin() + 1, sets.end(), [](const MotionSpace& set) {
       return !set.moments().empty() && set.moments().front().count() > 0;
     });
     if (first != sets.end() && first->points() == sets[0].points()) moments[0] = first->moments();
   }
-  sets[0].fit(std::move(moments[0]));
+  sets[0].fit(std::move(moments[0]), compute);
   return RegisteredSpace(std::move(sets));
 }
 
@@ -428,7 +437,7 @@ MotionSpace fit_pooled(const PreparedSource& clips, const RegisteredSpace& space
   MotionSpaceOptions pooled_options{.functions = 2 * options.alignment.functions, .pinned = pinned(options.space)};
   MotionSpace pooled(space.skeleton(), pooled_options, space.plain().points());
   pooled.set_references(space.references());
-  pooled.fit(std::move(gather_moments(clips, pooled, warps, compute, progress, "analyse").front()));
+  pooled.fit(std::move(gather_moments(clips, pooled, warps, compute, progress, "analyse").front()), compute);
   return pooled;
 }
 
@@ -531,14 +540,14 @@ PreparedSource with_choices(const PreparedSource& clips, const std::vector<RestC
   });
 }
 
-std::vector<RestChoice> choose_all(const PreparedSource& clips, const RegisteredSpace& space,
+std::vector<RestChoice> choose_all(const PreparedSource& clips, const RegisteredSpace& space, const Compute& compute,
                                    const Progress& progress) {
   std::vector<RestChoice> out(static_cast<std::size_t>(clips.count));
   for_each_clip<RestChoice>(
       clips, progress, "register",
       [&](int, PreparedClip& clip) {
         space.apply_references(clip.curves.values);
-        return choose_rests(space, clip.curves.values, clip.runs, clip.curves.rate_hz);
+        return choose_rests(space, clip.curves.values, clip.runs, clip.curves.rate_hz, compute);
       },
       [&](int i, RestChoice& choice) { out[static_cast<std::size_t>(i)] = std::move(choice); });
   return out;
@@ -550,8 +559,8 @@ std::vector<RestChoice> choose_all(const PreparedSource& clips, const Survey& fo
   if (found.stretches == 0) return std::vector<RestChoice>(static_cast<std::size_t>(clips.count));
   const PreparedSource both = with_runs(clips, [](int, const std::vector<Run>& runs) { return both_ways(runs); });
   const RegisteredSpace empty = empty_space(survey(both, progress), options.space, found.orientations.references());
-  RegisteredSpace space = fit_sets(empty, gather_moments(both, empty, {}, compute, progress, "register"));
-  std::vector<RestChoice> choices = choose_all(clips, space, progress);
+  RegisteredSpace space = fit_sets(empty, gather_moments(both, empty, {}, compute, progress, "register"), compute);
+  std::vector<RestChoice> choices = choose_all(clips, space, compute, progress);
   // A set costs what its functions and moments take, whatever it is used for.
   const Survey chosen = survey(with_choices(clips, choices), progress);
   const int all = std::accumulate(chosen.sequences.begin(), chosen.sequences.end(), 0);
@@ -563,7 +572,7 @@ std::vector<RestChoice> choose_all(const PreparedSource& clips, const Survey& fo
     sets[set] = empty.sets()[set];
     dropped = true;
   }
-  return dropped ? choose_all(clips, RegisteredSpace(std::move(sets)), progress) : choices;
+  return dropped ? choose_all(clips, RegisteredSpace(std::move(sets)), compute, progress) : choices;
 }
 
 }  // namespace
@@ -581,7 +590,7 @@ BuiltSpace build_space(const PreparedSource& all_clips, const SpaceBuildOptions&
   const bool warped =
       options.align && options.alignment.rounds > 0 && alignment_pays(clips, found, space, options, compute, progress);
   if (warped) warps = align_all(clips, space, options, compute, progress);
-  space = fit_sets(space, gather_moments(clips, space, warps, compute, progress, "analyse"));
+  space = fit_sets(space, gather_moments(clips, space, warps, compute, progress, "analyse"), compute);
   space.set_warped(warped);
   if (warps.empty()) warps.resize(static_cast<std::size_t>(clips.count));
   return {std::move(space), choices, std::move(warps)};
@@ -591,7 +600,7 @@ BuiltSpace extend_space(const RegisteredSpace& space, const PreparedSource& all_
                         const Compute& compute, const Progress& progress) {
   options.validate();
   // Kinds of sequences that the space has not met are cut at rests.
-  const std::vector<RestChoice> choices = choose_all(all_clips, space, progress);
+  const std::vector<RestChoice> choices = choose_all(all_clips, space, compute, progress);
   const PreparedSource clips = with_choices(all_clips, choices);
   std::vector<std::vector<Warp>> warps(static_cast<std::size_t>(clips.count));
   // Functions of all curves together are what warps are searched against; spaces of other groupings take clips as they
@@ -608,7 +617,7 @@ BuiltSpace extend_space(const RegisteredSpace& space, const PreparedSource& all_
     const std::vector<CurveMoments>& before = space.sets()[set].moments();
     for (std::size_t g = 0; g < before.size(); ++g) moments[set][g].merge(before[g]);
   }
-  BuiltSpace built{fit_sets(space, std::move(moments)), choices, std::move(warps)};
+  BuiltSpace built{fit_sets(space, std::move(moments), compute), choices, std::move(warps)};
   built.space.set_warped(space.warped());
   return built;
 }

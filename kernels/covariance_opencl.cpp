@@ -78,9 +78,9 @@ void add_on_device(OpenClDevice& device, bool lanes, const float* curves, Eigen:
       set(scatter_kernel, scatter_buffer);
       set(sum_kernel, sum_buffer);
       const auto range = matrix_opencl::range(lanes, width, width, blocks);
-      queue.enqueueNDRangeKernel(scatter_kernel, cl::NullRange, range.global, range.local);
-      queue.enqueueNDRangeKernel(sum_kernel, cl::NullRange,
-                                 cl::NDRange(static_cast<std::size_t>(width / 16), static_cast<std::size_t>(blocks)));
+      device.launch(KernelFamily::covariance, queue, scatter_kernel, range.global, range.local);
+      device.launch(KernelFamily::covariance, queue, sum_kernel,
+                    cl::NDRange(static_cast<std::size_t>(width / 16), static_cast<std::size_t>(blocks)));
       device.fetch(queue, sum_buffer, sums.data(), static_cast<std::size_t>(blocks * width * float_bytes));
       device.fetch(queue, scatter_buffer, scatters.data(),
                    static_cast<std::size_t>(blocks * width * width * float_bytes));

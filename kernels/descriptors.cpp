@@ -23,6 +23,14 @@ auto timed(double& seconds, const Call& call) {
   return result;
 }
 
+// Of each of so many calls.
+template <typename Call>
+std::vector<double> times_of(int rounds, const Call& call) {
+  std::vector<double> out(static_cast<std::size_t>(rounds));
+  for (double& seconds : out) static_cast<void>(timed(seconds, call));
+  return out;
+}
+
 template <typename A, typename B>
 double relative_error(const Eigen::MatrixBase<A>& found, const Eigen::MatrixBase<B>& expected) {
   if (found.rows() != expected.rows() || found.cols() != expected.cols()) return HUGE_VAL;
@@ -123,6 +131,34 @@ Comparison compare_reconstruction(const Sizes& sizes, const Compute& compute, st
   return out;
 }
 
+std::vector<double> time_distances(const Sizes& sizes, const Compute& compute, int rounds) {
+  std::mt19937 random(1);
+  const auto a = random_rows(sizes[0], sizes[2], random);
+  const auto b = random_rows(sizes[1], sizes[2], random);
+  return times_of(rounds, [&] { return keyframe_distances(a, b, DistanceKind::squared, compute); });
+}
+
+std::vector<double> time_dtw(const Sizes& sizes, const Compute& compute, int rounds) {
+  std::mt19937 random(1);
+  const auto clips = random_walks(sizes[0], sizes[1], sizes[2], random);
+  const auto pairs = all_pairs(clips.clips());
+  return times_of(rounds, [&] { return dtw(clips, clips, pairs, {}, compute); });
+}
+
+std::vector<double> time_covariance(const Sizes& sizes, const Compute& compute, int rounds) {
+  std::mt19937 random(1);
+  const auto curves = random_rows(sizes[0], sizes[1], random);
+  return times_of(rounds, [&] { return covariance(curves, 1, BlockPrecision::single_precision, compute); });
+}
+
+std::vector<double> time_projection(const Sizes& sizes, const Compute& compute, int rounds) {
+  std::mt19937 random(1);
+  const auto curves = random_rows(sizes[0], sizes[1], random);
+  const Eigen::VectorXf mean = Eigen::VectorXf::Constant(sizes[1], 2.5F);
+  const auto functions = random_rows(sizes[1], sizes[2], random);
+  return times_of(rounds, [&] { return project(curves, mean, functions, compute); });
+}
+
 KernelDescriptor distance_descriptor() {
   return {.name = "keyframe_distance",
           .family = KernelFamily::keyframe_distances,
@@ -138,10 +174,12 @@ KernelDescriptor distance_descriptor() {
                          {64, 64, 64},
                          {129, 127, 130}},
           .bench_sizes = {1000, 1000, 128},
+          .calibration_sizes = {{128, 128, 128}, {1500, 1500, 128}},
           .tolerance = 2e-6,
           .flops = [](const Sizes& s) { return 2 * product(s); },
           .bytes = [](const Sizes& s) { return 4.0 * (s[2] * (s[0] + s[1] * 1.0) + 1.0 * s[0] * s[1]); },
-          .compare = compare_distances};
+          .compare = compare_distances,
+          .seconds = time_distances};
 }
 
 KernelDescriptor dtw_descriptor(std::string name, const DtwOptions& options) {
@@ -168,6 +206,13 @@ KernelDescriptor dtw_descriptor(std::string name, const DtwOptions& options) {
                                std::uint32_t seed) { return compare_dtw(sizes, compute, options, seed); }};
 }
 
+KernelDescriptor plain_dtw_descriptor() {
+  KernelDescriptor plain = dtw_descriptor("dtw", {});
+  plain.calibration_sizes = {{16, 100, 64}, {64, 200, 64}};
+  plain.seconds = time_dtw;
+  return plain;
+}
+
 KernelDescriptor covariance_descriptor() {
   return {.name = "covariance",
           .family = KernelFamily::covariance,
@@ -185,10 +230,12 @@ KernelDescriptor covariance_descriptor() {
                          {5000, 128},
                          {20, 257}},
           .bench_sizes = {65536, 128},
+          .calibration_sizes = {{2048, 128}, {32768, 128}},
           .tolerance = 5e-6,
           .flops = [](const Sizes& s) { return 1.0 * s[0] * s[1] * (s[1] + 1); },
           .bytes = [](const Sizes& s) { return 4.0 * s[0] * s[1] + 8.0 * s[1] * s[1]; },
-          .compare = compare_covariance};
+          .compare = compare_covariance,
+          .seconds = time_covariance};
 }
 
 KernelDescriptor projection_descriptor(std::string name, decltype(&compare_projection) compare) {
@@ -209,6 +256,13 @@ KernelDescriptor projection_descriptor(std::string name, decltype(&compare_proje
           .flops = [](const Sizes& s) { return 2 * product(s); },
           .bytes = [](const Sizes& s) { return 4.0 * s[0] * (s[1] + s[2]) + 4.0 * s[1] * s[2]; },
           .compare = compare};
+}
+
+KernelDescriptor project_descriptor() {
+  KernelDescriptor project = projection_descriptor("project", compare_projection);
+  project.calibration_sizes = {{1000, 128, 20}, {40000, 128, 20}};
+  project.seconds = time_projection;
+  return project;
 }
 
 // A smooth symmetric surface with noise.
@@ -234,6 +288,14 @@ Comparison compare_surfaces(const Sizes& sizes, const Compute& compute, std::uin
   timed(out.reference_seconds, [&] { return smoother.smooth(surface, expected), 0; });
   out.error = relative_error(found, expected);
   return out;
+}
+
+std::vector<double> time_surfaces(const Sizes& sizes, const Compute& compute, int rounds) {
+  std::mt19937 random(1);
+  const Eigen::MatrixXd surface = noisy_surface(sizes[0], random);
+  LocalLinearSurface smoother(sizes[0], sizes[1], SmoothingKernel::epanechnikov, 0.2, Diagonal::left_out);
+  Eigen::MatrixXd found;
+  return times_of(rounds, [&] { return smoother.smooth(surface, found, compute), 0; });
 }
 
 Comparison compare_lines(const Sizes& sizes, const Compute& compute, SmoothingKernel kernel, std::uint32_t seed) {
@@ -262,11 +324,13 @@ KernelDescriptor surface_descriptor() {
           .size_names = {"points", "out_points"},
           .test_sizes = {{4, 1}, {5, 4}, {15, 16}, {16, 15}, {17, 17}, {33, 100}, {101, 51}},
           .bench_sizes = {200, 200},
+          .calibration_sizes = {{64, 64}, {400, 400}},
           .tolerance = 1e-11,
           .single_tolerance = 1e-4,
           .flops = [](const Sizes& s) { return 4.0 * product(s) * (s[0] + s[1]); },
           .bytes = [](const Sizes& s) { return 8.0 * (1.0 * s[0] * s[0] + 1.0 * s[1] * s[1]); },
-          .compare = compare_surfaces};
+          .compare = compare_surfaces,
+          .seconds = time_surfaces};
 }
 
 KernelDescriptor line_descriptor(std::string name, SmoothingKernel kernel) {
@@ -288,13 +352,13 @@ KernelDescriptor line_descriptor(std::string name, SmoothingKernel kernel) {
 std::vector<KernelDescriptor> kernel_descriptors() {
   const auto slopes = StepPattern::slope_limited;
   return {distance_descriptor(),
-          dtw_descriptor("dtw", {}),
+          plain_dtw_descriptor(),
           dtw_descriptor("dtw, path", {.want_path = true}),
           dtw_descriptor("dtw, band, squared", {.band_fraction = 0.1, .squared = true}),
           dtw_descriptor("dtw, slopes", {.steps = slopes}),
           dtw_descriptor("dtw, slopes, band, path", {.steps = slopes, .band_fraction = 0.2, .want_path = true}),
           covariance_descriptor(),
-          projection_descriptor("project", compare_projection),
+          project_descriptor(),
           projection_descriptor("reconstruct", compare_reconstruction),
           surface_descriptor(),
           line_descriptor("local_linear_line, epanechnikov", SmoothingKernel::epanechnikov),

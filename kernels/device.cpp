@@ -12,12 +12,14 @@
 #include <cblas.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/kernels/calibration.h"
 #include "kinespace/kernels/detail/opencl.h"
 
 namespace kinespace {
 namespace {
 
-// Where "auto" leaves the processor: floating-point operations of one call. Infinity: never.
+// Where "auto" leaves the processor for a device that was not measured here: floating-point operations of one call.
+// Infinity: never.
 //
 // `processor`: OpenCL devices that are processors, measured with PoCL 3.1 on two AVX-512 cores (GFLOP/s here and there;
 // `kinespace bench kernels` prints them on any machine):
@@ -41,8 +43,16 @@ constexpr std::array kThresholds{
     Threshold{KernelFamily::covariance, kNever, 1e11},         Threshold{KernelFamily::projection, kNever, 1e11},
     Threshold{KernelFamily::local_linear, kNever, 1e11},
 };
-// Below this nothing profits, so that a small call under "auto" need not even look for devices.
-constexpr double kSmallest = 5e9;
+
+const Threshold& threshold_of(KernelFamily family) {
+  return *std::find_if(kThresholds.begin(), kThresholds.end(),
+                       [&](const Threshold& threshold) { return threshold.family == family; });
+}
+
+std::size_t index_of(KernelFamily family) {
+  return static_cast<std::size_t>(std::find(kernel_families.begin(), kernel_families.end(), family) -
+                                  kernel_families.begin());
+}
 
 std::optional<std::size_t> device_number(const std::string& choice) {
   const std::string prefix = "opencl:";
@@ -75,6 +85,9 @@ struct Compute::State {
   std::unique_ptr<OpenClDevice> device;
   std::string reason;  // why "auto" found no device
   std::atomic<bool> opened = false;
+  std::vector<DeviceCalibration> known;            // measured on this machine
+  const DeviceCalibration* calibration = nullptr;  // of the device that "auto" opened, if it is among them
+  std::array<std::atomic<std::uint64_t>, kernel_families.size()> processor_calls = {};
 
   // Opens the device that the choice names; throws Error{machine} when it is not there.
   void open_named() {
@@ -91,13 +104,52 @@ struct Compute::State {
       try {
         const auto devices = find_opencl_devices(reason);
         if (!devices.empty()) device = std::make_unique<OpenClDevice>(devices[best_of(devices)]);
+        if (device != nullptr) calibration = find_calibration(known, device->info());
       } catch (const Error& error) {
         reason = error.what();
       }
       opened = true;
     });
   }
+
+  // The least that any device that might be there would be opened for, so that a small call need not even look.
+  [[nodiscard]] double least_threshold(KernelFamily family) const {
+    const Threshold& other_machines = threshold_of(family);
+    double least = std::min(other_machines.processor, other_machines.gpu);
+    for (const DeviceCalibration& measured : known) least = std::min(least, measured.from_flops(family));
+    return least;
+  }
+  // Of the device that is open.
+  [[nodiscard]] double threshold(KernelFamily family) const {
+    if (calibration != nullptr) return calibration->from_flops(family);
+    const Threshold& other_machines = threshold_of(family);
+    return device->is_processor() ? other_machines.processor : other_machines.gpu;
+  }
+
+  // The device that the choice gives such a call, if any.
+  [[nodiscard]] OpenClDevice* chosen(KernelFamily family, double flops) {
+    if (choice == "cpu") return nullptr;
+    if (choice != "auto") return device.get();
+    if (flops < least_threshold(family)) return nullptr;
+    open_best();
+    return device == nullptr || flops < threshold(family) ? nullptr : device.get();
+  }
 };
+
+std::string_view name_of(KernelFamily family) {
+  constexpr std::array<std::string_view, kernel_families.size()> names{"keyframe_distances", "dtw", "covariance",
+                                                                       "projection", "local_linear"};
+  return names[index_of(family)];
+}
+
+KernelUses since(const KernelUses& before, const KernelUses& now) {
+  KernelUses out = now;
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    out[f].launches -= before[f].launches;
+    out[f].processor_calls -= before[f].processor_calls;
+  }
+  return out;
+}
 
 DeviceList list_opencl_devices() {
   DeviceList list;
@@ -114,6 +166,10 @@ Compute::Compute() : state_(std::make_shared<State>()) {}
 Compute::Compute(std::shared_ptr<State> state) : state_(std::move(state)) {}
 
 Compute Compute::open(const std::string& choice) {
+  return open(choice, {});
+}
+
+Compute Compute::open(const std::string& choice, std::vector<DeviceCalibration> known) {
   const bool named = choice == "opencl" || device_number(choice).has_value();
   if (!named && choice != "auto" && choice != "cpu") {
     throw Error(ErrorKind::usage,
@@ -121,6 +177,7 @@ Compute Compute::open(const std::string& choice) {
   }
   auto state = std::make_shared<State>();
   state->choice = choice;
+  state->known = std::move(known);
   if (named) state->open_named();
   return Compute(std::move(state));
 }
@@ -141,6 +198,11 @@ std::string Compute::describe() const {
   return state_->choice == "auto" ? processor + "; " + device + " for large kernels" : device;
 }
 
+std::optional<DeviceInfo> Compute::device_info() const {
+  if (!state_->opened || state_->device == nullptr) return std::nullopt;
+  return state_->device->info();
+}
+
 Compute Compute::with_variant(KernelVariant variant) const {
   Compute other(*this);
   other.variant_ = variant;
@@ -154,16 +216,23 @@ Compute Compute::without_double() const {
 }
 
 OpenClDevice* Compute::device_for(KernelFamily family, double flops) const {
-  if (state_->choice == "cpu") return nullptr;
-  if (state_->choice != "auto") return state_->device.get();
-  if (flops < kSmallest) return nullptr;
-  const auto row = std::find_if(kThresholds.begin(), kThresholds.end(),
-                                [&](const Threshold& threshold) { return threshold.family == family; });
-  if (flops < std::min(row->processor, row->gpu)) return nullptr;
-  state_->open_best();
-  const auto* device = state_->device.get();
-  if (device == nullptr || flops < (device->is_processor() ? row->processor : row->gpu)) return nullptr;
-  return state_->device.get();
+  auto* device = state_->chosen(family, flops);
+  if (device == nullptr) count_on_processor(family);
+  return device;
+}
+
+void Compute::count_on_processor(KernelFamily family) const {
+  state_->processor_calls[index_of(family)].fetch_add(1, std::memory_order_relaxed);
+}
+
+KernelUses Compute::uses() const {
+  KernelUses out;
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    out[f].processor_calls = state_->processor_calls[f].load(std::memory_order_relaxed);
+    // A device that is being opened by another thread has launched nothing yet.
+    if (state_->opened && state_->device != nullptr) out[f].launches = state_->device->launches(f);
+  }
+  return out;
 }
 
 bool Compute::uses_lanes(const OpenClDevice& device) const {

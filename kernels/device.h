@@ -5,13 +5,22 @@
 // built once per device and build options and kept in the Compute; nothing is cached on the disk (PoCL keeps its own
 // cache, where a build takes about 0.02 s instead of 0.5 s).
 //
+// Under "auto" every call goes where calls of its size are faster: by what was measured on this machine
+// (kernels/calibration.h) when that is handed over, else by figures of other machines, under which a processor that
+// shows itself as an OpenCL device gets large time warping only.
+//
+// A Compute counts what its kernels do, so that a program can say what ran where.
+//
 // "No device" is a returned state: an empty list with a reason, and for "auto" the processor.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace kinespace {
@@ -41,8 +50,24 @@ enum class KernelVariant { by_device, lanes, groups };
 
 // The kernels, for the sizes at which "auto" goes to OpenCL.
 enum class KernelFamily { keyframe_distances, dtw, covariance, projection, local_linear };
+inline constexpr std::array kernel_families{KernelFamily::keyframe_distances, KernelFamily::dtw,
+                                            KernelFamily::covariance, KernelFamily::projection,
+                                            KernelFamily::local_linear};
+// "keyframe_distances", "dtw" and so on.
+[[nodiscard]] std::string_view name_of(KernelFamily family);
 
-class OpenClDevice;  // kernels/detail/opencl.h, internal
+// What the kernels of a family did.
+struct KernelUse {
+  std::uint64_t launches = 0;         // of OpenCL kernels; one call may take several
+  std::uint64_t processor_calls = 0;  // calls that were computed by the plain code
+};
+// By family, in the order of kernel_families.
+using KernelUses = std::array<KernelUse, kernel_families.size()>;
+// What was added since `before`.
+[[nodiscard]] KernelUses since(const KernelUses& before, const KernelUses& now);
+
+class OpenClDevice;        // kernels/detail/opencl.h, internal
+struct DeviceCalibration;  // kernels/calibration.h
 
 class Compute {
  public:
@@ -53,11 +78,16 @@ class Compute {
   // processor); "opencl:N": device N of list_devices(). Throws Error{usage} for another choice and Error{machine} when
   // a device is named that is not there.
   [[nodiscard]] static Compute open(const std::string& choice = "auto");
+  // The same; "auto" goes by what was measured of its device, where that is among `known`.
+  [[nodiscard]] static Compute open(const std::string& choice, std::vector<DeviceCalibration> known);
 
   [[nodiscard]] const std::string& choice() const;
 
   // One line: what runs the kernels and with what precision. Under "auto" it names the OpenCL device once one was used.
   [[nodiscard]] std::string describe() const;
+
+  // The OpenCL device that is open; none on the processor, and under "auto" as long as none was needed.
+  [[nodiscard]] std::optional<DeviceInfo> device_info() const;
 
   // The same device with another kernel shape; for tests and benches.
   [[nodiscard]] Compute with_variant(KernelVariant variant) const;
@@ -65,9 +95,14 @@ class Compute {
   // The same device as if it had no double precision; for tests.
   [[nodiscard]] Compute without_double() const;
 
-  // The device for one call with that many floating-point operations, or nullptr: compute on the processor. Opens the
-  // device when that is still to be done.
+  // The device for one call with that many floating-point operations, or nullptr: compute on the processor, which is
+  // then counted. Opens the device when that is still to be done.
   [[nodiscard]] OpenClDevice* device_for(KernelFamily family, double flops) const;
+  // Counts a call that the processor computed though there was a device for it.
+  void count_on_processor(KernelFamily family) const;
+
+  // What has run so far through this Compute and its copies.
+  [[nodiscard]] KernelUses uses() const;
 
   // True when this device should run the `lanes` shape.
   [[nodiscard]] bool uses_lanes(const OpenClDevice& device) const;

@@ -84,7 +84,9 @@ OpenClDevice* device_for(const FeatureSet& queries, const FeatureSet& targets, s
   constexpr std::size_t fewest_lanes = 4;
   auto* device = compute.device_for(KernelFamily::dtw, dtw_detail::flops(queries, targets, pairs));
   if (device == nullptr || compute.choice() != "auto" || !compute.uses_lanes(*device)) return device;
-  return pairs.size() < fewest_lanes * dtw_detail::group_pairs(queries, targets, pairs).groups ? nullptr : device;
+  if (pairs.size() >= fewest_lanes * dtw_detail::group_pairs(queries, targets, pairs).groups) return device;
+  compute.count_on_processor(KernelFamily::dtw);
+  return nullptr;
 }
 
 }  // namespace
@@ -152,6 +154,7 @@ std::vector<DtwMatch> dtw(const FeatureSet& queries, const FeatureSet& targets, 
   } else {
     std::vector<std::size_t> left_over;
     dtw_detail::dtw_opencl(*device, compute.uses_lanes(*device), queries, targets, pairs, options, matches, left_over);
+    if (!left_over.empty()) compute.count_on_processor(KernelFamily::dtw);
     std::vector<ClipPair> rest(left_over.size());
     std::vector<DtwMatch> rest_matches(left_over.size());
     for (std::size_t p = 0; p < rest.size(); ++p) rest[p] = pairs[left_over[p]];

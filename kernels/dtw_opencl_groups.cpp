@@ -42,7 +42,7 @@ void run(DeviceTask& task, cl::Kernel& kernel, std::span<const DevicePair> pairs
   set_arguments(kernel, task.query_values, task.target_values, cl_int{task.queries.dims},
                 cl_int{task.query_clips.stride}, job_buffer, cl_int{task.options.band_fraction > 0},
                 cl_int{task.options.squared}, cl_int{task.transposed}, borders, step_buffer, cost_buffer);
-  task.queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(jobs.size() * kSide), cl::NDRange(kSide));
+  task.device.launch(KernelFamily::dtw, task.queue, kernel, cl::NDRange(jobs.size() * kSide), cl::NDRange(kSide));
   task.queue.enqueueReadBuffer(cost_buffer, CL_TRUE, 0, costs.size() * sizeof(float), costs.data());
   for (std::size_t p = 0; p < pairs.size(); ++p) matches[pairs[p].match].cost = costs[p];
   if (!task.options.want_path) return;

@@ -139,7 +139,7 @@ class LaneRunner {
                   cl_int{task_.query_clips.stride}, job_buffer, range_buffer, lane_buffer,
                   cl_int{task_.options.band_fraction > 0}, cl_int{task_.options.squared}, cl_int{task_.transposed},
                   scratch_, steps_, cost_buffer);
-    task_.queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(batch.size()), cl::NDRange(1));
+    task_.device.launch(KernelFamily::dtw, task_.queue, kernel_, cl::NDRange(batch.size()), cl::NDRange(1));
     task_.queue.enqueueReadBuffer(cost_buffer, CL_TRUE, 0, costs.size() * sizeof(float), costs.data());
     for (std::size_t g = 0; g < batch.size(); ++g) {
       for (std::size_t lane = 0; lane < batch[g].pairs.size(); ++lane) {

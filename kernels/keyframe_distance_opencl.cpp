@@ -34,7 +34,7 @@ RowMatrix<float> on_device(OpenClDevice& device, bool lanes, const Factors& fact
                     static_cast<cl_int>(turned.cols()), a_norm_buffer, b_norm_buffer,
                     cl_int{kind == DistanceKind::squared}, out_buffer);
       const auto range = matrix_opencl::range(lanes, n, m);
-      queue.enqueueNDRangeKernel(kernel, cl::NullRange, range.global, range.local);
+      device.launch(KernelFamily::keyframe_distances, queue, kernel, range.global, range.local);
       device.fetch(queue, out_buffer, out.data() + first * m, out_bytes);
     }
   });

@@ -88,9 +88,9 @@ void smooth_surface(OpenClDevice& device, bool lanes, const SurfaceTables& table
                   half);
     set_arguments(smooth_rows, half, weights, weights_u, bands, cl_int{stride}, sum, sum_u);
     set_arguments(combine, sum, sum_u, constant_buffer, slope_buffer, cl_int{out_points}, cl_int{stride}, out_buffer);
-    queue.enqueueNDRangeKernel(smooth_columns, cl::NullRange, items(lanes, out_points, points));
-    queue.enqueueNDRangeKernel(smooth_rows, cl::NullRange, items(lanes, out_points, out_points));
-    queue.enqueueNDRangeKernel(combine, cl::NullRange, items(false, out_points, out_points));
+    device.launch(KernelFamily::local_linear, queue, smooth_columns, items(lanes, out_points, points));
+    device.launch(KernelFamily::local_linear, queue, smooth_rows, items(lanes, out_points, out_points));
+    device.launch(KernelFamily::local_linear, queue, combine, items(false, out_points, out_points));
     device.fetch(queue, out_buffer, result.data(), static_cast<std::size_t>(result.size()) * sizeof(T));
   });
   out = result.template cast<double>();
@@ -122,7 +122,7 @@ LineFit fit_line(OpenClDevice& device, bool lanes, std::span<const double> value
     const auto regularity_buffer = device.output(std::span<T>(regularity));
     set_arguments(local_line, value_buffer, weight_buffer, place_buffer, static_cast<cl_int>(values.size()),
                   static_cast<T>(bandwidth), out_buffer, regularity_buffer);
-    queue.enqueueNDRangeKernel(local_line, cl::NullRange, items(lanes, static_cast<int>(places.size())));
+    device.launch(KernelFamily::local_linear, queue, local_line, items(lanes, static_cast<int>(places.size())));
     device.fetch(queue, out_buffer, fitted.data(), fitted.size() * sizeof(T));
     device.fetch(queue, regularity_buffer, regularity.data(), regularity.size() * sizeof(T));
   });
@@ -171,7 +171,10 @@ std::vector<double> local_linear_line(std::span<const double> values, std::span<
   auto fit = fp64 ? fit_line<double>(*device, lanes, values, weights, kernel, bandwidth, at)
                   : fit_line<float>(*device, lanes, values, weights, kernel, bandwidth, at);
   // Windows that are nearly empty are the plain code's to judge.
-  if (!(fit.least_regularity > (fp64 ? 1e-9 : 1e-4))) return local_linear_line(values, weights, kernel, bandwidth, at);
+  if (!(fit.least_regularity > (fp64 ? 1e-9 : 1e-4))) {
+    compute.count_on_processor(KernelFamily::local_linear);
+    return local_linear_line(values, weights, kernel, bandwidth, at);
+  }
   return std::move(fit.values);
 }
 

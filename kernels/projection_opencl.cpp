@@ -36,7 +36,7 @@ RowMatrix<float> on_device(OpenClDevice& device, bool lanes, const RowMatrixView
       set_arguments(kernel, a_buffer, b_buffer, shift_buffer, offset_buffer, static_cast<cl_int>(n),
                     static_cast<cl_int>(m), static_cast<cl_int>(depth), static_cast<cl_int>(wide.cols()), out_buffer);
       const auto range = matrix_opencl::range(lanes, n, m);
-      queue.enqueueNDRangeKernel(kernel, cl::NullRange, range.global, range.local);
+      device.launch(KernelFamily::projection, queue, kernel, range.global, range.local);
       device.fetch(queue, out_buffer, out.data() + first * m, static_cast<std::size_t>(n * m) * sizeof(float));
     }
   });

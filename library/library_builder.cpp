@@ -169,9 +169,7 @@ class SpaceWriter {
       progress.check_stop();
       progress.at("encode", static_cast<double>(start) / source.count);
       const int count = std::min(clips_per_block, source.count - start);
-      std::vector<Ready> ready(static_cast<std::size_t>(count));
-      tbb::parallel_for(0, count,
-                        [&](int i) { ready[static_cast<std::size_t>(i)] = make(source.load(start + i), start + i); });
+      const std::vector<Ready> ready = make(source, start, count);
       for (int i = 0; i < count; ++i)
         add(*imports[static_cast<std::size_t>(start + i)], ready[static_cast<std::size_t>(i)], report);
     }
@@ -185,17 +183,62 @@ class SpaceWriter {
     std::vector<float> retrieval;
   };
 
-  [[nodiscard]] Ready make(PreparedClip prepared, int index) const {
-    Ready out;
-    built_.space.apply_references(prepared.curves.values);
-    out.clip = encode(built_.space, prepared.curves, built_.runs_of(index, prepared.runs),
-                      built_.warps[static_cast<std::size_t>(index)], compute_);
+  // Clips of ordinary length are encoded together, for a device to have many sequences at a time. A long one is enough by
+  // itself, and would stay in memory meanwhile; and the processor gains nothing.
+  [[nodiscard]] std::vector<Ready> make(const PreparedSource& source, int start, int count) const {
+    constexpr int ordinary_frames = 4096;
+    std::vector<Ready> out(static_cast<std::size_t>(count));
+    std::vector<std::optional<PreparedClip>> held(out.size());
+    tbb::parallel_for(0, count, [&](int i) {
+      const auto at = static_cast<std::size_t>(i);
+      PreparedClip clip = source.load(start + i);
+      built_.space.apply_references(clip.curves.values);
+      clip.runs = built_.runs_of(start + i, clip.runs);
+      if (compute_.choice() != "cpu" && clip.curves.frames() <= ordinary_frames) {
+        held[at] = std::move(clip);
+        return;
+      }
+      out[at].clip = encode(built_.space, clip.curves, clip.runs, warps_of(start + i), compute_);
+      out[at].retrieval = clips_.vector_of(clip.curves, compute_);
+      complete(std::move(clip), out[at]);
+    });
+    encode_together(start, held, out);
+    tbb::parallel_for(std::size_t{0}, held.size(), [&](std::size_t at) {
+      if (held[at]) complete(*std::move(held[at]), out[at]);
+    });
+    return out;
+  }
+
+  // Clips and retrieval vectors of those that are held.
+  void encode_together(int start, const std::vector<std::optional<PreparedClip>>& held, std::vector<Ready>& out) const {
+    std::vector<ClipToEncode> clips;
+    std::vector<const ClipCurves*> curves;
+    std::vector<std::size_t> places;
+    for (std::size_t at = 0; at < held.size(); ++at) {
+      if (!held[at]) continue;
+      places.push_back(at);
+      curves.push_back(&held[at]->curves);
+      clips.push_back({&held[at]->curves, held[at]->runs, warps_of(start + static_cast<int>(at))});
+    }
+    if (clips.empty()) return;
+    std::vector<EncodedClip> encoded = encode(built_.space, clips, compute_);
+    std::vector<std::vector<float>> vectors = clips_.vectors_of(curves, compute_);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      out[places[i]].clip = std::move(encoded[i]);
+      out[places[i]].retrieval = std::move(vectors[i]);
+    }
+  }
+
+  [[nodiscard]] const std::vector<Warp>& warps_of(int index) const {
+    return built_.warps[static_cast<std::size_t>(index)];
+  }
+
+  // Rounds what was encoded as it is stored, and measures how far it is from the clip.
+  void complete(PreparedClip prepared, Ready& out) const {
     round_to_stored(out.clip, built_.space);
     measure_levels(decoder_, prepared.curves, prepared.skeleton, built_.space.levels(), out.clip);
     out.clip.feet = keep_feet(clip_from_curves(prepared.curves, prepared.skeleton), prepared.curves.placement);
-    out.retrieval = clips_.vector_of(prepared.curves);
     out.skeleton = std::move(prepared.skeleton);
-    return out;
   }
 
   void add(const Import& import, const Ready& ready, LibraryReport& report) {
@@ -290,13 +333,13 @@ void build_tree(const std::string& tree_hash, const std::vector<const Import*>& 
     const RegisteredSpace from = unpack_registered_space(old_space->blob, name);
     const ClipSpace clips_from = ClipSpace::unpack(old_clips->blob, name);
     const BuiltSpace built = extend_space(from, source, options.space, compute, progress);
-    const ClipSpace clips = clips_from.extend(source, progress);
+    const ClipSpace clips = clips_from.extend(source, compute, progress);
     SpaceWriter writer(library, built, clips, tree_hash, compute);
     transfer_clips(library, writer.space_id(), from, built.space, clips_from, clips);
     writer.write(imports, source, report, progress);
   } else {
     const BuiltSpace built = build_space(source, options.space, compute, progress);
-    const ClipSpace clips = ClipSpace::build(source, built.space.references(), options.clips, progress);
+    const ClipSpace clips = ClipSpace::build(source, built.space.references(), options.clips, compute, progress);
     SpaceWriter(library, built, clips, tree_hash, compute).write(imports, source, report, progress);
   }
 }
@@ -424,8 +467,10 @@ LibraryReport build_library(const std::vector<std::filesystem::path>& files, con
   for (const auto& [tree_hash, members] : by_tree)
     build_tree(tree_hash, members, options, build, compute, progress, report);
   if (report.frames > 0) report.mean_joint_error_cm /= static_cast<double>(report.frames);
+  progress.at("store", 0);
   summarise(build.library(), report);
   build.finish();
+  progress.at("store", 1);
   report.bytes = static_cast<std::int64_t>(std::filesystem::file_size(target));
   return report;
 }

@@ -10,6 +10,7 @@
 #include "kinespace/base/error.h"
 #include "kinespace/fpca/pose_features.h"
 #include "kinespace/kernels/dtw.h"
+#include "kinespace/kernels/keyframe_distance.h"
 #include "kinespace/synthesis/detail/library_clips.h"
 
 namespace kinespace {
@@ -21,16 +22,64 @@ struct Candidate {
   double cost = 0;     // of the DTW
 };
 
+// The vectors that may be among the `keep` nearest to the query: all but those that the kernel's distances, with what
+// their rounding may be, tell to be farther than so many others. Places in the matrix, ascending.
+//
+// A sum of d products in float is within d 2^-23 of its terms' magnitudes, so the kernel's squared distance is within
+// d 2^-23 (|a|^2 + |b|^2), norms about the vectors' mean; |b| <= |a| + the distance itself.
+std::vector<std::size_t> perhaps_nearest(const RetrievalMatrix& matrix, const std::vector<float>& query,
+                                         const std::vector<float>& weights, std::vector<std::size_t> places,
+                                         std::size_t keep, const Compute& compute) {
+  const auto dims = static_cast<Eigen::Index>(matrix.dimensions);
+  const double flops = 2.0 * static_cast<double>(places.size()) * static_cast<double>(dims);
+  if (places.size() <= keep || compute.device_for(KernelFamily::keyframe_distances, flops) == nullptr) return places;
+  RowMatrix<float> vectors(static_cast<Eigen::Index>(places.size()), dims);
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    vectors.row(static_cast<Eigen::Index>(i)) =
+        Eigen::Map<const Eigen::RowVectorXf>(matrix.values.data() + places[i] * matrix.dimensions, dims);
+  }
+  RowMatrix<float> wanted = Eigen::Map<const Eigen::RowVectorXf>(query.data(), dims);
+  if (!weights.empty()) {
+    Eigen::RowVectorXf scale(dims);
+    for (Eigen::Index d = 0; d < dims; ++d) scale(d) = weights[static_cast<std::size_t>(d) % weights.size()];
+    vectors.array().rowwise() *= scale.array();
+    wanted.array().rowwise() *= scale.array();
+  }
+  const RowMatrix<float> table = keyframe_distances(wanted, vectors, DistanceKind::squared, compute);
+  const double own = (wanted - vectors.colwise().mean()).cast<double>().norm();
+  std::vector<double> slack(places.size());
+  std::vector<double> farthest(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto found = static_cast<double>(table(0, static_cast<Eigen::Index>(i)));
+    const double other = own + std::sqrt(found);
+    slack[i] = 0x1p-22 * static_cast<double>(dims) * (own * own + other * other);
+    farthest[i] = found + slack[i];
+  }
+  std::vector<double> sorted = farthest;
+  std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(keep - 1));
+  const double limit = sorted[keep - 1];
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (farthest[i] - 2 * slack[i] <= limit) out.push_back(places[i]);
+  }
+  return out;
+}
+
 // The `keep` nearest vectors, nearest first, of clips that may be matches.
 std::vector<Candidate> nearest_vectors(const RetrievalMatrix& matrix, const std::vector<float>& query,
                                        const std::vector<float>& weights, const std::vector<ClipRow>& rows,
-                                       const QueryOptions& options, const std::string& except, std::size_t keep) {
-  std::vector<Candidate> out;
+                                       const QueryOptions& options, const std::string& except, std::size_t keep,
+                                       const Compute& compute) {
+  std::vector<std::size_t> allowed;
   std::size_t row = 0;
   for (std::size_t i = 0; i < matrix.clip_ids.size(); ++i) {
     while (row < rows.size() && rows[row].id < matrix.clip_ids[i]) ++row;
     if (row == rows.size() || rows[row].id != matrix.clip_ids[i]) continue;
     if ((!except.empty() && rows[row].name == except) || !has_labels(rows[row], options.labels)) continue;
+    allowed.push_back(i);
+  }
+  std::vector<Candidate> out;
+  for (const std::size_t i : perhaps_nearest(matrix, query, weights, std::move(allowed), keep, compute)) {
     const auto vector = std::span(matrix.values).subspan(i * matrix.dimensions, matrix.dimensions);
     out.push_back({.clip_id = matrix.clip_ids[i], .squared = squared_distance(query, vector, weights)});
   }
@@ -98,6 +147,7 @@ class RerankBatch {
 
 void rerank(LibraryView& library, ClipCurves curves, const Skeleton& skeleton, const QueryOptions& options,
             const Compute& compute, const Progress& progress, std::vector<Candidate>& candidates) {
+  progress.at("warp", 0);
   RerankBatch batch(std::move(curves), skeleton, options, compute);
   for (Candidate& candidate : candidates) {
     progress.check_stop();
@@ -139,9 +189,10 @@ std::vector<Match> nearest_motions(LibraryView& library, ClipCurves curves, cons
                                    const QueryOptions& options, const std::string& except, const Compute& compute,
                                    const Progress& progress) {
   options.validate();
+  progress.at("search", 0);
   const auto space_id = library.space_for(skeleton);
   if (!space_id) return {};
-  const std::vector<float> query = library.clip_space(*space_id).vector_of(curves);
+  const std::vector<float> query = library.clip_space(*space_id).vector_of(curves, compute);
   const RetrievalMatrix matrix = library.library().retrieval_matrix(*space_id);
   if (matrix.dimensions != 0 && matrix.dimensions != query.size()) {
     throw Error(ErrorKind::bad_input, {.file = library.library().path().string(),
@@ -153,7 +204,7 @@ std::vector<Match> nearest_motions(LibraryView& library, ClipCurves curves, cons
   const auto wanted = static_cast<std::size_t>(options.k);
   const std::size_t keep = options.rerank ? std::max(wanted, static_cast<std::size_t>(options.candidates)) : wanted;
   const std::vector<ClipRow> rows = library.library().clips();
-  std::vector<Candidate> found = nearest_vectors(matrix, query, weights, rows, options, except, keep);
+  std::vector<Candidate> found = nearest_vectors(matrix, query, weights, rows, options, except, keep, compute);
   if (options.rerank) rerank(library, std::move(curves), skeleton, options, compute, progress, found);
   found.resize(std::min(found.size(), wanted));
 

@@ -1,7 +1,8 @@
 // The motions nearest to a clip: yoo2019's distance in the space of whole clips, and the best of these again by time
 // warping.
 //
-// The vectors are searched by the exact L2 distance of all dimensions (eq. 3, or eq. 14 with joint weights); the
+// The vectors are searched by the exact L2 distance of all dimensions (eq. 3, or eq. 14 with joint weights), of which an
+// OpenCL device, where one is to be used, leaves those that its rounding cannot tell from the nearest ones; the
 // `candidates` best are then compared by DTW of their keyframes (eq. 12; a slanted band of 10 % of the length, cost
 // divided by the sum of both lengths, since a sum alone favours short clips) and ordered by that. Ties go to the clip
 // that was added first. Of a clip of more than 10 000 frames the band is narrower, by rerank_band, so that a clip that

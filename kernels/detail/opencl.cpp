@@ -97,6 +97,13 @@ cl::Kernel OpenClDevice::kernel(const char* source, const std::string& options, 
   });
 }
 
+void OpenClDevice::launch(KernelFamily family, const cl::CommandQueue& queue, const cl::Kernel& kernel,
+                          const cl::NDRange& global, const cl::NDRange& local) {
+  queue.enqueueNDRangeKernel(kernel, cl::NullRange, global, local);
+  const auto index = std::find(kernel_families.begin(), kernel_families.end(), family) - kernel_families.begin();
+  launches_[static_cast<std::size_t>(index)].fetch_add(1, std::memory_order_relaxed);
+}
+
 void OpenClDevice::fetch(const cl::CommandQueue& queue, const cl::Buffer& from, void* to, std::size_t bytes) const {
   if (!is_processor()) {
     queue.enqueueReadBuffer(from, CL_TRUE, 0, bytes, to);

@@ -4,6 +4,8 @@
 #define CL_HPP_TARGET_OPENCL_VERSION 120
 #define CL_HPP_MINIMUM_OPENCL_VERSION 120
 #define CL_HPP_ENABLE_EXCEPTIONS
+#include <array>
+#include <atomic>
 #include <map>
 #include <mutex>
 #include <span>
@@ -56,6 +58,14 @@ class OpenClDevice {
   // A new kernel object of the program, which is built when these options are new. `source` is one of opencl_source.
   [[nodiscard]] cl::Kernel kernel(const char* source, const std::string& options, const char* name);
 
+  // Enqueues a kernel of that family, which is counted. `local` may be cl::NullRange.
+  void launch(KernelFamily family, const cl::CommandQueue& queue, const cl::Kernel& kernel, const cl::NDRange& global,
+              const cl::NDRange& local = cl::NullRange);
+  // How many were, by place in kernel_families.
+  [[nodiscard]] std::uint64_t launches(std::size_t family) const {
+    return launches_[family].load(std::memory_order_relaxed);
+  }
+
   // Buffers. Processors read the caller's memory in place where the driver allows it; the span must outlive the buffer.
   template <typename T>
   [[nodiscard]] cl::Buffer input(std::span<const T> values) const {
@@ -81,6 +91,7 @@ class OpenClDevice {
   std::uint64_t largest_buffer_ = 0;
   std::mutex building_;
   std::map<std::pair<const char*, std::string>, cl::Program> programs_;
+  std::array<std::atomic<std::uint64_t>, kernel_families.size()> launches_ = {};
 };
 
 template <typename... Args>

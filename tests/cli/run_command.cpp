@@ -38,7 +38,16 @@ std::vector<char*> pointers(std::vector<std::string>& strings) {
   return out;
 }
 
-std::vector<std::string> environment_with(const std::vector<std::string>& extra) {
+// Not the user's: what was measured on this machine would decide where kernels run.
+const std::string& own_cache() {
+  static const TemporaryFolder folder;
+  static const std::string variable = "XDG_CACHE_HOME=" + folder.path().string();
+  return variable;
+}
+
+std::vector<std::string> environment_with(std::vector<std::string> extra) {
+  const auto sets_cache = [](const std::string& entry) { return entry.starts_with("XDG_CACHE_HOME="); };
+  if (std::none_of(extra.begin(), extra.end(), sets_cache)) extra.push_back(own_cache());
   std::vector<std::string> out = extra;
   for (char** entry = environ; *entry != nullptr; ++entry) {
     const std::string text = *entry;

@@ -7,6 +7,7 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/kernels/detail/dtw.h"
+#include "tests/support/data.h"
 #include "tests/support/library_folder.h"
 
 namespace kinespace {
@@ -79,6 +80,29 @@ TEST_F(Retrieval, the_list_of_vectors_equals_brute_force) {
     EXPECT_EQ(matches[i].clip, all[i].second);
     EXPECT_NEAR(matches[i].distance * matches[i].distance, all[i].first, 1e-9 + 1e-6 * all[i].first);
   }
+}
+
+TEST_F(Retrieval, a_device_leaves_the_list_as_it_is) {
+  if (list_devices().empty()) {
+    if (test::data_required()) FAIL() << "no OpenCL device";
+    GTEST_SKIP() << "no OpenCL device on this machine";
+  }
+  LibraryView view(folder_->library());
+  const Compute device = Compute::open("opencl");
+  for (const ClipRow& row : view.library().clips()) {
+    for (const bool weighted : {false, true}) {
+      const QueryOptions options{.k = 3, .rerank = false, .weighted = weighted};
+      const Clip clip = at_speed(read_clip(row.source), 1.1);
+      const auto here = nearest_motions(view, clip, options);
+      const auto there = nearest_motions(view, clip, options, {}, device);
+      ASSERT_EQ(here.size(), there.size());
+      for (std::size_t i = 0; i < here.size(); ++i) {
+        EXPECT_EQ(here[i].clip, there[i].clip);
+        EXPECT_NEAR(here[i].distance, there[i].distance, 1e-4 * here[i].distance + 1e-5);  // the query's own vector
+      }
+    }
+  }
+  EXPECT_GT(device.uses()[static_cast<std::size_t>(KernelFamily::keyframe_distances)].launches, 0U);
 }
 
 TEST_F(Retrieval, labels_and_the_query_itself_are_left_out) {
