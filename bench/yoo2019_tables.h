@@ -21,7 +21,7 @@ void add_smoothing_tables(const PreparedSet& set, const std::optional<std::files
                           BenchReport& report);
 
 // Table 6: functions that the same error takes, ours, Fourier's and Legendre's; `judged`: with bars, which are for
-// captured motion. Figure 8: the three near the sharpest change of all curves.
+// captured motion. Figure 8: the three near a sharp change.
 void add_basis_tables(const PreparedSet& set, bool judged, BenchReport& report);
 
 // Tables 7 and 8: ratio and distortion rate of motion vectors of 6 functions. Figure 9: ratio by number of functions.

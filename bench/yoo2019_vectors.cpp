@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -202,10 +203,9 @@ void add_figure_9(const PreparedSet& set, const VectorSpace& space, BenchReport&
     const std::array<double, 3> drawn{ours, legendre, fourier};
     for (std::size_t s = 0; s < drawn.size(); ++s) plot.series[s].points.push_back({static_cast<double>(n), drawn[s]});
   }
-  for (const char* basis : {"Our method", "Legendre", "Fourier"}) {
-    if (const auto paper = paper_number(9, "5", basis)) {
-      plot.series.push_back({fmt::format("paper: {}", basis), {{5, *paper}}});
-    }
+  for (const auto& [basis, name] : {std::pair("Our method", "paper: ours"), std::pair("Legendre", "paper: Legendre"),
+                                    std::pair("Fourier", "paper: Fourier")}) {
+    if (const auto paper = paper_number(9, "5", basis)) plot.series.push_back({name, {{5, *paper}}});
   }
   report.tables.push_back(std::move(table));
   report.pictures.push_back({"yoo2019-figure-9-" + picture_name(set.name), to_svg(plot)});

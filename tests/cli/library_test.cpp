@@ -50,7 +50,8 @@ TEST_F(LibraryCommands, build_reports_what_it_made) {
 
 TEST_F(LibraryCommands, build_counts_functions_over_all_groups_and_sets) {
   const std::string grouped = out("grouped.kspace").string();
-  const CommandResult built = run_command({"build", clips().string(), "-o", grouped, "--grouping", "component", "--json"});
+  const CommandResult built =
+      run_command({"build", clips().string(), "-o", grouped, "--grouping", "component", "--json"});
   ASSERT_EQ(built.code, 0) << built.err;
   const json report = json::parse(built.out);
   const json info = json::parse(run_command({"info", grouped, "--json"}).out);
