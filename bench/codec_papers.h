@@ -1,5 +1,4 @@
-// The tables and figures of the papers that compare codecs, remade on the clips given. Part of `kinespace bench
-// codecs`.
+// The tables and figures of khan2014, which compares codecs, remade on the clips given. Part of `kinespace bench codecs`.
 #pragma once
 
 #include <span>
@@ -24,10 +23,5 @@ void add_sweep(const ClipSweep& sweep, BenchReport& report);
 // khan2014: table 4 (every codec at qbc's error), figure 11 (ratio over error, a clip a picture), figures 17 and 18
 // (the limit of the squared distance over ratio and over error); and whether qbc is ahead at every point of its sweep.
 void add_khan2014(std::span<const ClipSweep> sweeps, BenchReport& report);
-
-// yoo2019: table 6 (functions for an error), table 7 and 8 (ratio and distortion rate of motion vectors, 6 functions),
-// figure 9 (ratio by number of functions, ours, Fourier's and Legendre's for the same error), on a library of the
-// folders.
-void add_yoo2019(const BenchOptions& options, BenchReport& report);
 
 }  // namespace kinespace

@@ -1,5 +1,5 @@
 // `kinespace bench codecs`: what codecs make of clips. Sizes of the motion-space codec at given errors and its speed;
-// every codec over its range of qualities; the tables and figures of khan2014 and yoo2019.
+// every codec over its range of qualities; the tables and figures of khan2014.
 #include <algorithm>
 #include <array>
 #include <filesystem>
@@ -181,7 +181,6 @@ void add_papers(const BenchOptions& options, BenchReport& report) {
   for (const fs::path& clip : paper_clips(options)) sweeps.push_back(sweep_clip(clip));
   add_khan2014(sweeps, report);
   for (const ClipSweep& sweep : sweeps) add_sweep(sweep, report);
-  if (options.clips.empty()) add_yoo2019(options, report);
 }
 
 void add_motion_space(const BenchOptions& options, BenchReport& report) {

@@ -3,7 +3,6 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <ctime>
 #include <iterator>
 #include <map>
@@ -16,11 +15,11 @@
 
 #include "bench/covariance_stream.h"
 #include "bench/golden.h"
+#include "bench/middle_seconds.h"
 #include "bench/report.h"
 #include "bench/space.h"
 #include "kinespace/fpca/functional_pca.h"
 #include "kinespace/kernels/calibration.h"
-#include "kinespace/motion/curves.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace {
@@ -29,27 +28,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int curve_count = 6510;
-constexpr int curve_points = 100;
+constexpr int curve_points = middle_second_points;
 
 struct Sample {
   CurveMatrix curves;
   std::string source;
 };
-
-// Rows of `out` from `row` on: the rotation curves of the second in the middle of a clip. Returns the next free row.
-Eigen::Index add_middle_second(const ClipCurves& clip, CurveMatrix& out, Eigen::Index row) {
-  const double last_frame = std::min<double>(clip.frames() - 1, std::round(clip.rate_hz));
-  const double first_frame = std::floor((clip.frames() - 1 - last_frame) / 2);
-  for (Eigen::Index curve = 3; curve < clip.values.cols() && row < out.rows(); ++curve, ++row) {
-    for (int t = 0; t < curve_points; ++t) {
-      const double frame = first_frame + last_frame * t / (curve_points - 1);
-      const auto below = std::min(static_cast<Eigen::Index>(frame), static_cast<Eigen::Index>(clip.frames() - 2));
-      const double share = frame - static_cast<double>(below);
-      out(row, t) = (1 - share) * clip.values(below, curve) + share * clip.values(below + 1, curve);
-    }
-  }
-  return row;
-}
 
 std::vector<fs::path> motion_files(const fs::path& folder) {
   std::vector<fs::path> out;
@@ -100,13 +84,6 @@ Sample sample_curves(const BenchOptions& options) {
   return out;
 }
 
-FpcaOptions timed_options() {
-  return {.mean = MeanEstimate::smooth,
-          .smooth_covariance = true,
-          .estimate_noise = true,
-          .scores = ScoreKind::conditional};
-}
-
 struct Times {
   std::vector<double> wall, processor;  // ms
 };
@@ -145,7 +122,7 @@ void measure_speed(const BenchOptions& options, BenchReport& report) {
   const Sample sample = sample_curves(options);
   openblas_set_num_threads(1);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(curve_points, curve_points);
-  FunctionalPcaWorkspace workspace(curve_points, timed_options());
+  FunctionalPcaWorkspace workspace(curve_points, smoothed_fpca());
   Times product, whole, reused;
   double used = 0;  // so that no result is thrown away unseen
   constexpr int warm_up = 5, repeats = 61;
@@ -153,7 +130,7 @@ void measure_speed(const BenchOptions& options, BenchReport& report) {
     const bool keep = i >= warm_up;
     time_once(product, keep, [&] { product_alone(sample.curves, gram); });
     time_once(whole, keep,
-              [&] { used += fit_functional_pca(sample.curves, timed_options()).scores(sample.curves)(0, 0); });
+              [&] { used += fit_functional_pca(sample.curves, smoothed_fpca()).scores(sample.curves)(0, 0); });
     time_once(reused, keep, [&] { used += workspace.fit(sample.curves).scores(sample.curves)(0, 0); });
   }
   const bool finite = std::isfinite(used + gram(0, 0));
@@ -170,15 +147,6 @@ void measure_speed(const BenchOptions& options, BenchReport& report) {
   add("smoothed FPCA, median wall time", median(whole.wall), "ms");
   add("smoothed FPCA over bare DSYRK, median wall times", median(whole.wall) / median(product.wall), "x");
   add("smoothed FPCA over bare DSYRK, fastest wall times", fastest(whole.wall) / fastest(product.wall), "x");
-}
-
-std::optional<fs::path> golden_folder(const BenchOptions& options) {
-  if (options.golden) return options.golden;
-  const char* named = std::getenv("KINESPACE_GOLDEN");
-  const fs::path standard = named != nullptr && *named != '\0' ? fs::path(named) : fs::path("../shared/golden/fpca");
-  std::error_code error;
-  if (fs::is_directory(standard, error)) return standard;
-  return std::nullopt;
 }
 
 // The worst of all cases for each quantity.
@@ -207,10 +175,9 @@ void compare_golden(const fs::path& folder, BenchReport& report) {
 BenchReport bench_fpca(const BenchOptions& options) {
   const Compute compute = open_calibrated(options.device);
   BenchReport report{.bench = "fpca", .device = "", .threads = 2, .results = {}};
-  if (const auto golden = golden_folder(options)) compare_golden(*golden, report);
+  if (const auto golden = find_golden_folder(options.golden)) compare_golden(*golden, report);
   measure_speed(options, report);
   std::ranges::copy(bench_covariance_stream(compute), std::back_inserter(report.results));
-  basis_rows(options, report);
   space_rows(options, compute, report);
   report.device = compute.describe();
   report.kernels = compute.uses();

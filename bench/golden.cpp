@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <optional>
 #include <string_view>
@@ -180,6 +181,15 @@ GoldenCase read_golden_case(const fs::path& folder) {
     if (value != "NA") out.scalars[name] = parse_number(value, scalars, 0);
   }
   return out;
+}
+
+std::optional<fs::path> find_golden_folder(const std::optional<fs::path>& given) {
+  if (given) return given;
+  const char* named = std::getenv("KINESPACE_GOLDEN");
+  const fs::path standard = named != nullptr && *named != '\0' ? fs::path(named) : fs::path("../shared/golden/fpca");
+  std::error_code error;
+  if (fs::is_directory(standard, error)) return standard;
+  return std::nullopt;
 }
 
 std::vector<fs::path> find_golden_cases(const fs::path& root) {

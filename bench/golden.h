@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,10 @@ struct GoldenCase {
 // Throws Error{bad_input} naming file, line and what is wrong: a missing file, rows of different lengths, words where
 // numbers should be, a grid that is not regular, an option that we do not have.
 [[nodiscard]] GoldenCase read_golden_case(const std::filesystem::path& folder);
+
+// The folder of golden cases: the one given, else $KINESPACE_GOLDEN, else ../shared/golden/fpca where that is there.
+[[nodiscard]] std::optional<std::filesystem::path> find_golden_folder(
+    const std::optional<std::filesystem::path>& given);
 
 // The folders of `root` that hold an input.csv, by name; `root` itself when it is one. Throws Error{bad_input} for
 // none.

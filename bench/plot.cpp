@@ -118,7 +118,7 @@ std::string to_svg(const Plot& plot) {
       if (!x.shows(point.x) || !y.shows(point.y)) continue;
       const Svg::Point at(x.pixel(point.x), y.pixel(point.y));
       if (before != nullptr) svg.line({x.pixel(before->x), y.pixel(before->y)}, at, colour, 1.8);
-      svg.circle(at, 2.6, colour, colour, 1);
+      if (plot.series[s].dots) svg.circle(at, 2.6, colour, colour, 1);
       before = &point;
     }
     const double row = top + 10 + 20 * static_cast<double>(s);

@@ -13,7 +13,8 @@ struct PlotSeries {
   };
   std::string name;
   std::vector<Point>
-      points;  // drawn in this order; points that an axis cannot show (<= 0 where logarithmic) are left out
+      points;        // drawn in this order; points that an axis cannot show (<= 0 where logarithmic) are left out
+  bool dots = true;  // at the points; curves of many points are better without
 };
 
 struct PlotAxis {

@@ -43,7 +43,7 @@ nlohmann::ordered_json json(const BenchTable& table) {
     }
     rows.push_back(std::move(cells));
   }
-  return {{"title", table.title}, {"columns", table.columns}, {"rows", std::move(rows)}};
+  return {{"title", table.title}, {"columns", table.columns}, {"rows", std::move(rows)}, {"notes", table.notes}};
 }
 
 nlohmann::ordered_json json(const KernelUses& uses) {
@@ -108,6 +108,7 @@ std::string to_markdown(const BenchTable& table) {
     for (const BenchCell& value : row) out += fmt::format(" {} |", cell(words(value)));
   }
   out += '\n';
+  for (const std::string& note : table.notes) out += fmt::format("\n{}\n", cell(note));
   return out;
 }
 
@@ -130,6 +131,7 @@ std::string to_text(const BenchTable& table) {
     for (std::size_t c = 0; c < widths.size(); ++c) add(c, words(row[c]));
   }
   out += '\n';
+  for (const std::string& note : table.notes) out += fmt::format("  {}\n", note);
   return out;
 }
 

@@ -42,6 +42,7 @@ struct BenchTable {
   std::string title;
   std::vector<std::string> columns;
   std::vector<std::vector<BenchCell>> rows;  // each as long as `columns`
+  std::vector<std::string> notes{};          // what a reader must know, and why a cell is empty
 };
 
 // A figure of a paper, remade: SVG.
@@ -61,7 +62,7 @@ struct BenchReport {
 };
 
 struct BenchOptions {
-  // Instead of what the bench takes from `data`, where it can: bench codecs.
+  // Instead of what the bench takes from `data`, where it can: codecs (clips), yoo2019 (clips and folders).
   std::vector<std::filesystem::path> clips;
   std::filesystem::path data;                   // folder with cmu/, bandai1/, bandai2/, mesh/
   std::optional<std::filesystem::path> golden;  // folder of golden FPCA cases
@@ -69,8 +70,8 @@ struct BenchOptions {
 };
 
 // The report as one JSON object: bench, device, threads, results: [{name, data, value, unit, bar, ok}], bar null where
-// there is none; tables: [{title, columns, rows}], an empty cell null; kernels: [{kernel, launches, processor_calls}] or
-// null.
+// there is none; tables: [{title, columns, rows, notes}], an empty cell null; kernels: [{kernel, launches,
+// processor_calls}] or null.
 [[nodiscard]] std::string to_json(const BenchReport& report);
 
 // The report as a markdown table: a heading, what computed it, one row a result. What docs/results.md is made of.
@@ -104,5 +105,6 @@ struct Bench {
 [[nodiscard]] BenchReport bench_rma(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_search(const BenchOptions& options);
 [[nodiscard]] BenchReport bench_transitions(const BenchOptions& options);
+[[nodiscard]] BenchReport bench_yoo2019(const BenchOptions& options);
 
 }  // namespace kinespace

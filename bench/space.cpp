@@ -11,42 +11,13 @@
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
 
-#include "kinespace/base/error.h"
+#include "bench/prepared_set.h"
 #include "kinespace/fpca/level_errors.h"
 #include "kinespace/fpca/space_builder.h"
 #include "kinespace/motion/kinematics.h"
-#include "kinespace/motion/read.h"
 
 namespace kinespace {
 namespace {
-
-struct DataSet {
-  std::string name;
-  std::vector<Clip> clips;
-  std::vector<PreparedClip> prepared;
-};
-
-DataSet load_data_set(const std::string& name, const std::vector<std::filesystem::path>& folders) {
-  std::vector<std::filesystem::path> files;
-  for (const auto& folder : folders) {
-    if (!std::filesystem::is_directory(folder)) {
-      throw Error(ErrorKind::bad_input, {.file = folder.string(),
-                                         .found = "no such folder",
-                                         .expected = "the clips of this bench",
-                                         .remedy = "name the folder that has them with --data"});
-    }
-    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-      if (is_motion_file(entry.path())) files.push_back(entry.path());
-    }
-  }
-  std::ranges::sort(files);
-  DataSet out{name, std::vector<Clip>(files.size()), std::vector<PreparedClip>(files.size())};
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) {
-    out.clips[i] = read_clip(files[i]);
-    out.prepared[i] = prepare(out.clips[i]);
-  });
-  return out;
-}
 
 // What one clip adds to the figures of a level of detail.
 struct ClipFigures {
@@ -110,7 +81,7 @@ struct Figures {
   double jump_ratio = 0;
 };
 
-Figures measure(const DataSet& data, const RegisteredSpace& space, const std::vector<EncodedClip>& encoded, int n) {
+Figures measure(const PreparedSet& data, const RegisteredSpace& space, const std::vector<EncodedClip>& encoded, int n) {
   std::vector<ClipFigures> parts(data.clips.size());
   tbb::parallel_for(std::size_t{0}, parts.size(),
                     [&](std::size_t i) { parts[i] = measure(space, data.clips[i], encoded[i], n); });
@@ -140,13 +111,13 @@ Figures measure(const DataSet& data, const RegisteredSpace& space, const std::ve
   return out;
 }
 
-std::vector<EncodedClip> encode_all(const DataSet& data, const BuiltSpace& built) {
-  std::vector<EncodedClip> out(data.prepared.size());
+// As a library has them: with the detail that fast motion takes.
+std::vector<EncodedClip> encode_with_detail(const PreparedSet& data, const BuiltSpace& built) {
+  std::vector<EncodedClip> out = encode_all(data, built);
   const ClipDecoder decoder(built.space);
   tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
     ClipCurves curves = data.prepared[i].curves;
     built.space.apply_references(curves.values);
-    out[i] = encode(built.space, curves, built.runs_of(static_cast<int>(i), data.prepared[i].runs), built.warps[i]);
     measure_levels(decoder, curves, data.prepared[i].skeleton, built.space.levels(), out[i]);
   });
   return out;
@@ -174,10 +145,10 @@ struct Bars {
   double at_all;
 };
 
-void level_of_detail_rows(const DataSet& data, const Bars& bars, const Compute& compute, BenchReport& report) {
+void level_of_detail_rows(const PreparedSet& data, const Bars& bars, const Compute& compute, BenchReport& report) {
   SpaceBuildOptions options;
   const BuiltSpace built = build_space(source_of(data.prepared), options, compute);
-  const std::vector<EncodedClip> encoded = encode_all(data, built);
+  const std::vector<EncodedClip> encoded = encode_with_detail(data, built);
   const auto add = [&](const std::string& name, double value, const char* unit, std::optional<double> bar) {
     report.results.push_back({.name = name, .data = data.name, .value = value, .unit = unit, .bar = bar});
   };
@@ -200,8 +171,8 @@ void level_of_detail_rows(const DataSet& data, const Bars& bars, const Compute& 
 // Mean joint error at so many numbers a second, between the two levels around it (its logarithm by theirs).
 class ErrorCurve {
  public:
-  ErrorCurve(const DataSet& data, const BuiltSpace& built)
-      : data_(data), space_(built.space), encoded_(encode_all(data, built)) {}
+  ErrorCurve(const PreparedSet& data, const BuiltSpace& built)
+      : data_(data), space_(built.space), encoded_(encode_with_detail(data, built)) {}
   [[nodiscard]] double at(double numbers) {
     int level = 1;
     while (level < space_.levels() && numbers_a_second(space_, encoded_, level + 1) <= numbers) ++level;
@@ -217,23 +188,15 @@ class ErrorCurve {
     if (found != known_.end()) return found->second;
     return known_[level] = measure(data_, space_, encoded_, level).mean;
   }
-  const DataSet& data_;
+  const PreparedSet& data_;
   const RegisteredSpace& space_;
   std::vector<EncodedClip> encoded_;
   std::map<int, double> known_;
 };
 
-// The data cut otherwise.
-DataSet cut_again(const DataSet& data, const SequenceOptions& options) {
-  DataSet out{data.name, data.clips, std::vector<PreparedClip>(data.clips.size())};
-  tbb::parallel_for(std::size_t{0}, data.clips.size(),
-                    [&](std::size_t i) { out.prepared[i] = prepare(data.clips[i], options); });
-  return out;
-}
-
 // Every clip in equal windows of about that length.
-DataSet cut_windows(const DataSet& data, double length_s) {
-  DataSet out = cut_again(data, {.most_cycles = 0});
+PreparedSet cut_windows(const PreparedSet& data, double length_s) {
+  PreparedSet out = cut_again(data, {.most_cycles = 0});
   for (PreparedClip& clip : out.prepared) {
     for (Run& run : clip.runs) {
       const int first = run.cuts.front();
@@ -265,7 +228,7 @@ struct MeanLength {
   [[nodiscard]] double mean() const { return sequences > 0 ? seconds / sequences : 0; }
 };
 
-MeanLength length_of(const DataSet& data, const BuiltSpace& built, int cycles) {
+MeanLength length_of(const PreparedSet& data, const BuiltSpace& built, int cycles) {
   MeanLength out;
   for (std::size_t clip_number = 0; clip_number < data.prepared.size(); ++clip_number) {
     const PreparedClip& clip = data.prepared[clip_number];
@@ -287,14 +250,15 @@ struct RegistrationBars {
 };
 
 // What registration is worth: cut at cycles, against as many equal windows (build --no-align).
-void registration_rows(const DataSet& data, const RegistrationBars& bars, const Compute& compute, BenchReport& report) {
+void registration_rows(const PreparedSet& data, const RegistrationBars& bars, const Compute& compute,
+                       BenchReport& report) {
   const auto add = [&](const std::string& name, double value, const char* unit, std::optional<double> bar) {
     report.results.push_back({.name = name, .data = data.name, .value = value, .unit = unit, .bar = bar});
   };
   SpaceBuildOptions options;
   const BuiltSpace registered = build_space(source_of(data.prepared), options, compute);
   options.align = false;
-  const DataSet windows = cut_again(data, {.equal_windows = true});
+  const PreparedSet windows = cut_again(data, {.equal_windows = true});
   const BuiltSpace plain = build_space(source_of(windows.prepared), options, compute);
   double cyclic = 0;
   double all = 0;
@@ -307,7 +271,7 @@ void registration_rows(const DataSet& data, const RegistrationBars& bars, const 
   const int three = SequenceOptions{}.most_cycles;
   if (registered.space.has(three)) {
     const double length = length_of(data, registered, three).mean();
-    const DataSet same_length = cut_windows(data, length);
+    const PreparedSet same_length = cut_windows(data, length);
     const BuiltSpace held_against = build_space(source_of(same_length.prepared), options, compute);
     add("mean length of three cycles", length, "s", {});
     for (const auto& [left, bar] : {std::pair(1e-3, bars.functions_999), std::pair(1e-4, bars.functions_9999)}) {
@@ -331,8 +295,8 @@ bool is_walk_or_run(const std::string& name) {
   return name.starts_with("walk") || name.starts_with("run");
 }
 
-DataSet walks_and_runs(const DataSet& all) {
-  DataSet data{all.name + ", walks and runs", {}, {}};
+PreparedSet walks_and_runs(const PreparedSet& all) {
+  PreparedSet data{all.name + ", walks and runs", {}, {}};
   for (std::size_t i = 0; i < all.clips.size(); ++i) {
     if (!is_walk_or_run(all.clips[i].name)) continue;
     data.clips.push_back(all.clips[i]);
@@ -344,12 +308,12 @@ DataSet walks_and_runs(const DataSet& all) {
 }  // namespace
 
 void space_rows(const BenchOptions& options, const Compute& compute, BenchReport& report) {
-  const DataSet bandai = load_data_set("bandai1+bandai2", {options.data / "bandai1", options.data / "bandai2"});
+  const PreparedSet bandai = load_prepared_set("bandai1+bandai2", {options.data / "bandai1", options.data / "bandai2"});
   level_of_detail_rows(bandai, {1.0, 0.25, 0.06}, compute, report);
   registration_rows(walks_and_runs(bandai), {0.6, 0.8, 0.8}, compute, report);
   registration_rows(bandai, {}, compute, report);
-  const DataSet cmu =
-      load_data_set("cmu 01-03", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
+  const PreparedSet cmu =
+      load_prepared_set("cmu 01-03", {options.data / "cmu/01", options.data / "cmu/02", options.data / "cmu/03"});
   level_of_detail_rows(cmu, {0.75, 0.40, 0.10}, compute, report);
   registration_rows(cmu, {}, compute, report);
 }

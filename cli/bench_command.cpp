@@ -89,7 +89,8 @@ void add_bench(CLI::App& app, Session& /*session*/) {
   command->add_option("--golden", options->golden, "Folder of golden FPCA cases")->envname("KINESPACE_GOLDEN");
   command->add_option("--device", options->device, "auto, cpu or opencl[:N]")->capture_default_str();
   command->add_option("--clips", options->clips,
-                      fmt::format("bench codecs: sweep these clips ({}) instead", listed(clip_endings_read())));
+                      fmt::format("Of these clips ({}) instead: bench codecs and yoo2019, that also of folders",
+                                  listed(clip_endings_read())));
   command->add_option("--pictures", options->pictures, "Folder for the bench's figures, as SVG");
   auto* json = command->add_flag("--json", options->json, "Print one JSON object");
   command->add_flag("--markdown", options->markdown, "Print a markdown table")->excludes(json);

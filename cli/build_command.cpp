@@ -36,6 +36,7 @@ Json to_json(const LibraryReport& report, const std::filesystem::path& output, d
           {"sequences", report.sequences},
           {"spaces", report.spaces},
           {"functions", report.functions},
+          {"all_functions", report.all_functions},
           {"variance", report.variance},
           {"movement", report.movement},
           {"mean_joint_error_cm", report.mean_joint_error_cm},

@@ -370,6 +370,7 @@ void summarise(Library& library, LibraryReport& report) {
     const RegisteredSpace space = unpack_registered_space(library.space(row.id).blob, row.name);
     ++report.spaces;
     report.functions = std::max(report.functions, space.functions());
+    report.all_functions += space.function_count();
     report.variance = std::min(report.variance, space.variance_covered());
     report.movement = std::min(report.movement, space.movement_covered());
     report.warped = report.warped || space.warped();

@@ -31,7 +31,8 @@ struct LibraryReport {
   int resumed = 0;    // taken from a build that was stopped
   int sequences = 0;
   int spaces = 0;
-  int functions = 0;               // of the largest space
+  int functions = 0;               // most of a curve: of the largest group of all sets
+  int all_functions = 0;           // over all groups, sets and spaces
   double variance = 0;             // share covered, least of all spaces ...
   double movement = 0;             // ... and of each curve's about its own mean
   double mean_joint_error_cm = 0;  // of decoding the added clips with all functions

@@ -50,10 +50,28 @@ CommandResult LibraryCommands::built_;
 TEST_F(LibraryCommands, build_reports_what_it_made) {
   ASSERT_EQ(built_.code, 0) << built_.err;
   const json report = json::parse(built_.out);
-  for (const char* key : {"clips", "sequences", "functions", "variance", "bytes"})
+  for (const char* key : {"clips", "sequences", "functions", "all_functions", "variance", "bytes"})
     EXPECT_TRUE(report.contains(key)) << key;
   EXPECT_LT(report["mean_joint_error_cm"], 0.1);
   EXPECT_FALSE(std::filesystem::exists(library().string() + ".partial"));
+}
+
+TEST_F(LibraryCommands, build_counts_functions_over_all_groups_and_sets) {
+  const std::string grouped = out("grouped.kspace").string();
+  const CommandResult built =
+      run_command({"build", clips().string(), "-o", grouped, "--grouping", "component", "--json"});
+  ASSERT_EQ(built.code, 0) << built.err;
+  const json report = json::parse(built.out);
+  const json info = json::parse(run_command({"info", grouped, "--json"}).out);
+  int counted = 0;
+  int most = 0;
+  for (const json& set : info["spaces"][0]["sets"]) {
+    counted += set["functions"].get<int>();
+    most = std::max(most, set["functions_of_a_curve"].get<int>());
+  }
+  EXPECT_EQ(report["all_functions"], counted);
+  EXPECT_EQ(report["functions"], most);
+  EXPECT_GT(counted, 2 * most) << "seven groups";
 }
 
 TEST_F(LibraryCommands, info_describes_the_library_in_the_promised_keys) {
