@@ -190,10 +190,10 @@ BenchReport bench_retrieval(const BenchOptions& options) {
   const Labelled data = load_labelled(options.data / "bandai2");
   OrientationMoments orientations(curve_layout(data.clips.front().skeleton).joint_count());
   for (const PreparedClip& clip : data.clips) orientations.add(clip.curves.values);
-  const ClipSpace space = ClipSpace::build(source_of(data.clips), orientations.references());
+  const ClipSpace space = ClipSpace::build(source_of(data.clips), orientations.references(), {}, compute);
   Vectors vectors(data.clips.size());
   tbb::parallel_for(std::size_t{0}, vectors.size(),
-                    [&](std::size_t i) { vectors[i] = space.vector_of(data.clips[i].curves); });
+                    [&](std::size_t i) { vectors[i] = space.vector_of(data.clips[i].curves, compute); });
   const Vectors plain = resampled_vectors(data, space);
   const std::vector<float> costs = all_costs(keyframes_of(data), compute);
 
