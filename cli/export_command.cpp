@@ -131,7 +131,8 @@ void add_errors(const Exported& exported, const Clip& written, bool planted, Jso
 void add_feet(const Exported& exported, const Clip& unplanted, const Clip& written, bool planted, Json& result) {
   const auto& feet = exported.clip.feet;
   result["feet_planted"] = planted;
-  for (const char* key : {"foot_slide_cm_s", "foot_slide_unplanted_cm_s", "foot_slide_original_cm_s", "floor_penetration_cm"}) {
+  for (const char* key :
+       {"foot_slide_cm_s", "foot_slide_unplanted_cm_s", "foot_slide_original_cm_s", "floor_penetration_cm"}) {
     result[key] = nullptr;
   }
   if (!feet) return;

@@ -256,9 +256,8 @@ bool is_stream(const std::filesystem::path& file) {
 
 Json describe_stream(const InfoOptions& options, Session& /*session*/) {
   if (options.picture) {
-    throw Error(ErrorKind::usage, {.found = "--picture of a stream",
-                                   .expected = "a clip or a library",
-                                   .remedy = "decode it first"});
+    throw Error(ErrorKind::usage,
+                {.found = "--picture of a stream", .expected = "a clip or a library", .remedy = "decode it first"});
   }
   const StreamFile file(options.file, options.basis);
   const StreamReader* reader = &file.reader();
@@ -378,10 +377,10 @@ void add_info(CLI::App& app, Session& session) {
   command->add_flag("--json", options->json, "Print it as one JSON object");
   CLI::Option* repeats = command->add_flag(
       "--repeats", options->repeats, "Which stretches of the clips repeat others (repeated motion analysis, lin2011)");
-  CLI::Option* picture =
-      command->add_option("--picture", options->picture,
-                          "An SVG of the cycles of a clip, and its curves before and after registration; with --repeats "
-                          "of the self-distance table");
+  CLI::Option* picture = command->add_option(
+      "--picture", options->picture,
+      "An SVG of the cycles of a clip, and its curves before and after registration; with --repeats "
+      "of the self-distance table");
   command
       ->add_option("--clip", options->pictured_clip, "The clip of a library to draw, not the one with the most cycles")
       ->needs(picture)

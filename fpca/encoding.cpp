@@ -73,7 +73,8 @@ void reach_frames(const RegisteredSpace& space, const SampleMatrix& values, doub
     best = sequence.scores;
     least = most;
     if (most < enough) break;
-    const SampleMatrix change = RunSampler(missing, Run{{0, last}}, rate_hz).sample(0, last, sequence.warp, set.points());
+    const SampleMatrix change =
+        RunSampler(missing, Run{{0, last}}, rate_hz).sample(0, last, sequence.warp, set.points());
     sequence.scores += set.scores(change) - set.scores(SampleMatrix::Zero(change.rows(), change.cols()));
   }
   sequence.scores = std::move(best);
@@ -267,7 +268,8 @@ std::vector<EncodedClip> encode(const RegisteredSpace& space, std::span<const Cl
   std::vector<ScoreMatrix> scores = queue.finish();
   std::size_t next = 0;
   for (EncodedClip& clip : out) take_scores(clip, scores, next);
-  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) { complete_scores(space, *clips[i].curves, out[i]); });
+  tbb::parallel_for(std::size_t{0}, out.size(),
+                    [&](std::size_t i) { complete_scores(space, *clips[i].curves, out[i]); });
   return out;
 }
 

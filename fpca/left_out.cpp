@@ -45,7 +45,8 @@ Eigen::RowVectorXd LeftOut::left_out(const EncodedSequence& sequence, double own
   for (Eigen::Index c = place_curves; c < out.size(); ++c) {
     const auto group = static_cast<std::size_t>(group_of_[static_cast<std::size_t>(c)]);
     out(c) += values[group].tail(rest).dot(sequence.scores.col(c).tail(rest).cast<double>());
-  }  return out;
+  }
+  return out;
 }
 
 void LeftOut::correct(const EncodedSequence& before, const EncodedSequence& after, int level,

@@ -86,9 +86,9 @@ bool raise_detail(const MeasuredLevels& measured, EncodedClip& clip) {
   std::size_t number = 0;
   for (EncodedRun& run : clip.runs) {
     for (EncodedSequence& sequence : run.sequences) {
-      const bool too_far = std::any_of(measured.begin(), measured.upper_bound(finest_level_meant), [&](const auto& level) {
-        return level.second.worst[number] > largest_error_meant(level.first);
-      });
+      const bool too_far =
+          std::any_of(measured.begin(), measured.upper_bound(finest_level_meant),
+                      [&](const auto& level) { return level.second.worst[number] > largest_error_meant(level.first); });
       ++number;
       if (!too_far || sequence.extra_detail == 0 || sequence.extra_detail == most_extra_detail) continue;
       sequence.extra_detail = std::min(sequence.extra_detail + step, most_extra_detail);
@@ -122,7 +122,8 @@ void measure_levels(const ClipDecoder& decoder, const ClipCurves& original, cons
   }
   clip.levels.clear();
   for (const auto& [level, of_level] : measured) clip.levels.push_back({level, of_level.error});
-  clip.error = clip.levels.empty() ? measure_level(decoder, original, skeleton, clip, -1).error : clip.levels.back().error;
+  clip.error =
+      clip.levels.empty() ? measure_level(decoder, original, skeleton, clip, -1).error : clip.levels.back().error;
 }
 
 }  // namespace kinespace

@@ -89,7 +89,11 @@ class RegistrationPicture {
  public:
   RegistrationPicture(const ClipCurves& curves, const Skeleton& skeleton,
                       const std::vector<PicturedSequence>& sequences)
-      : curves_(curves), skeleton_(skeleton), sequences_(sequences), svg_(wide, 640), shown_(most_moving(curves, sequences, 3)) {
+      : curves_(curves),
+        skeleton_(skeleton),
+        sequences_(sequences),
+        svg_(wide, 640),
+        shown_(most_moving(curves, sequences, 3)) {
     for (const PicturedSequence& s : sequences) {
       cycles_ += s.cycles;
       if (s.cycles > 0) cyclic_frames_ += s.last - s.first;
@@ -109,11 +113,11 @@ class RegistrationPicture {
   }
 
   void draw_head() {
-    const std::string cycles =
-        cycles_ == 0 ? "no whole cycles found"
-                     : fmt::format("{} whole cycle{} of {:.2f} s, {:.0f} % of its time", cycles_,
-                                   cycles_ == 1 ? "" : "s", cyclic_frames_ / curves_.rate_hz / cycles_,
-                                   100.0 * cyclic_frames_ / std::max(1, curves_.frames() - 1));
+    const std::string cycles = cycles_ == 0
+                                   ? "no whole cycles found"
+                                   : fmt::format("{} whole cycle{} of {:.2f} s, {:.0f} % of its time", cycles_,
+                                                 cycles_ == 1 ? "" : "s", cyclic_frames_ / curves_.rate_hz / cycles_,
+                                                 100.0 * cyclic_frames_ / std::max(1, curves_.frames() - 1));
     svg_.label({left_margin, 28}, fmt::format("{}: {}", curves_.name, cycles), "start", 17, "#111111");
     double x = left_margin;
     const auto entry = [&](const char* colour, const std::string& words) {
@@ -176,7 +180,8 @@ class RegistrationPicture {
     for (int k = 0; k < cycles_; ++k) before.push_back(stretch(curve, k * window, (k + 1) * window));
     for (const PicturedSequence& s : sequences_) {
       const double cycle = s.cycles > 0 ? static_cast<double>(s.last - s.first) / s.cycles : 0;
-      for (int k = 0; k < s.cycles; ++k) after.push_back(stretch(curve, s.first + k * cycle, s.first + (k + 1) * cycle));
+      for (int k = 0; k < s.cycles; ++k)
+        after.push_back(stretch(curve, s.first + k * cycle, s.first + (k + 1) * cycle));
     }
     const Scale scale(curve.minCoeff(), curve.maxCoeff(), overlay_top + 8, overlay_height - 16);
     const double width = (wide - left_margin - right_margin - overlay_gap) / 2;
@@ -197,9 +202,10 @@ class RegistrationPicture {
       }
       svg_.polyline(points, curve_colours[0], 0.8);
     }
-    svg_.label({left, overlay_top + overlay_height + 20},
-               fmt::format("{}, {:.3f} from their mean (rms)", curve_name(skeleton_, shown_.front()), spread(stretches)),
-               "start", 13, ink);
+    svg_.label(
+        {left, overlay_top + overlay_height + 20},
+        fmt::format("{}, {:.3f} from their mean (rms)", curve_name(skeleton_, shown_.front()), spread(stretches)),
+        "start", 13, ink);
     svg_.label({left + width, overlay_top + overlay_height + 20}, "phase, 0 to 1", "end", 12, ink);
   }
 

@@ -24,16 +24,16 @@ const Clip& standing() {
 // Both arms are thrown up and down again within a third of a second, `times` times, a second apart from `start_s` on.
 Clip with_blows(Clip clip, double start_s, int times) {
   for (const char* name : {"LeftArm", "RightArm"}) {
-    const int joint = static_cast<int>(std::ranges::find(clip.skeleton.joints, name, &Joint::name) -
-                                       clip.skeleton.joints.begin());
+    const int joint =
+        static_cast<int>(std::ranges::find(clip.skeleton.joints, name, &Joint::name) - clip.skeleton.joints.begin());
     for (int f = 0; f < clip.frames; ++f) {
       double angle = 0;
       for (int k = 0; k < times; ++k) {
         const double x = (f / clip.rate_hz - start_s - k) / 0.08;
         angle += 2.2 * std::exp(-x * x);
       }
-      clip.set_rotation(joint, f,
-                        clip.rotation(joint, f) * Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX())));
+      clip.set_rotation(
+          joint, f, clip.rotation(joint, f) * Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX())));
     }
   }
   return clip;
@@ -142,8 +142,8 @@ TEST(LevelErrors, a_sequence_has_the_functions_that_it_needs) {
 
 TEST(LevelErrors, motion_to_and_fro_from_frame_to_frame_is_kept_by_a_space_that_can) {
   Clip clip = standing();
-  const int joint = static_cast<int>(std::ranges::find(clip.skeleton.joints, "LeftArm", &Joint::name) -
-                                     clip.skeleton.joints.begin());
+  const int joint =
+      static_cast<int>(std::ranges::find(clip.skeleton.joints, "LeftArm", &Joint::name) - clip.skeleton.joints.begin());
   for (int f = 0; f < clip.frames; ++f) {
     const double angle = 0.1 * std::sin(2.6 * f) * std::sin(0.05 * f);
     clip.set_rotation(joint, f,
