@@ -1,4 +1,5 @@
 // Motion spaces and clips of earlier versions: fixtures/README.md.
+#include <algorithm>
 #include <filesystem>
 #include <string>
 
@@ -39,7 +40,7 @@ class LibraryFixture : public ::testing::TestWithParam<std::string> {
     return unpack_clip({part("vectors"), part("warps"), part("sides")}, space(), original.skeleton, header, GetParam());
   }
 };
-INSTANTIATE_TEST_SUITE_P(All, LibraryFixture, ::testing::Values("v1", "v2"),
+INSTANTIATE_TEST_SUITE_P(All, LibraryFixture, ::testing::Values("v1", "v2", "v3"),
                          [](const auto& version) { return version.param; });
 
 TEST_P(LibraryFixture, plays_as_near_to_what_was_read_as_was_measured_when_it_was_made) {
@@ -70,6 +71,21 @@ TEST(LibraryFixtures, of_version_2_have_sequences_of_whole_cycles) {
   const RegisteredSpace space = unpack_registered_space(fixture("space_v2.ksm"), "space_v2.ksm");
   EXPECT_TRUE(space.options().pinned);
   EXPECT_GT(space.sets().size(), 1U);
+}
+
+TEST(LibraryFixtures, of_version_3_have_more_detail_for_fast_motion_and_feet) {
+  const RegisteredSpace space = unpack_registered_space(fixture("space_v3.ksm"), "space_v3.ksm");
+  const Clip original = walk();
+  const EncodedClip clip = unpack_clip(
+      {fixture("clip_vectors_v3.ksm"), fixture("clip_warps_v3.ksm"), fixture("clip_sides_v3.ksm")}, space,
+      original.skeleton, {.name = original.name, .rate_hz = original.rate_hz, .frames = original.frames}, "v3");
+  int most_detail = 0;
+  for (const EncodedRun& run : clip.runs) {
+    for (const EncodedSequence& s : run.sequences) most_detail = std::max(most_detail, s.extra_detail);
+  }
+  EXPECT_GT(most_detail, 0);
+  ASSERT_TRUE(clip.feet);
+  EXPECT_GT(clip.feet->contacts.size(), 2U);
 }
 
 }  // namespace
