@@ -129,18 +129,20 @@ void add_errors(const Exported& exported, const Clip& written, bool planted, Jso
 }
 
 void add_feet(const Exported& exported, const Clip& unplanted, const Clip& written, bool planted, Json& result) {
-  const auto& feet = exported.clip.feet;
   result["feet_planted"] = planted;
-  for (const char* key :
-       {"foot_slide_cm_s", "foot_slide_unplanted_cm_s", "foot_slide_original_cm_s", "floor_penetration_cm"}) {
-    result[key] = nullptr;
+  if (!exported.clip.feet) {
+    for (const char* key :
+         {"foot_slide_cm_s", "foot_slide_unplanted_cm_s", "foot_slide_original_cm_s", "floor_penetration_cm"}) {
+      result[key] = Json();
+    }
+    return;
   }
-  if (!feet) return;
-  const FeetMeasures now = measure_feet(written, *feet, exported.clip.placement);
+  const KeptFeet& feet = *exported.clip.feet;
+  const FeetMeasures now = measure_feet(written, feet, exported.clip.placement);
+  const FeetMeasures before = planted ? measure_feet(unplanted, feet, exported.clip.placement) : now;
   result["foot_slide_cm_s"] = now.slide_cm_s;
-  result["foot_slide_unplanted_cm_s"] =
-      planted ? measure_feet(unplanted, *feet, exported.clip.placement).slide_cm_s : now.slide_cm_s;
-  result["foot_slide_original_cm_s"] = feet->slide_cm_s;
+  result["foot_slide_unplanted_cm_s"] = before.slide_cm_s;
+  result["foot_slide_original_cm_s"] = feet.slide_cm_s;
   result["floor_penetration_cm"] = now.floor_penetration_cm;
 }
 
