@@ -166,7 +166,7 @@ TEST(MotionSpace, a_smoothed_space_gives_back_noisy_clips_nearer_to_the_truth) {
       SampleMatrix curves = noisy[i].curves.values, truth = prepared_samples()[i].curves.values;
       built.space.apply_references(curves);
       built.space.apply_references(truth);
-      for (const Run& run : built.runs_of(static_cast<int>(i), noisy[i].runs)) {
+      for (const auto& run : built.runs_of(static_cast<int>(i), noisy[i].runs)) {
         const RunSampler of_noisy(curves, run, noisy[i].curves.rate_hz), of_truth(truth, run, noisy[i].curves.rate_hz);
         for (int k = 0; k < run.sequence_count(); ++k) {
           const MotionSpace& set = built.space.of(run.cycles_of(k));
