@@ -235,8 +235,9 @@ void add_export(CLI::App& app, Session& session) {
           ->check(CLI::NonNegativeNumber)
           ->excludes(lod);
   command
-      ->add_flag("--plant-feet,!--no-plant-feet", options->plant_feet,
-                 fmt::format("Feet stand where the original's stood (by itself below {} functions)", planted_below))
+      ->add_flag_function(
+          "--plant-feet,!--no-plant-feet", [options](std::int64_t times) { options->plant_feet = times > 0; },
+          fmt::format("Feet stand where the original's stood (by itself below {} functions)", planted_below))
       ->excludes(max_error);
   command->add_flag("--json", options->json, "Print what was written as one JSON object");
   session.files.reads(command, {"LIB", "--clip"});

@@ -21,7 +21,7 @@ const Clip& standing() {
   return *std::ranges::find(clips, "stand_calm_001", &Clip::name);
 }
 
-// Both arms are thrown up and down again within a third of a second, `times` times, a second apart from `start_s` on.
+// Both arms are thrown up and down again within a tenth of a second, `times` times, a second apart from `start_s` on.
 Clip with_blows(Clip clip, double start_s, int times) {
   for (const char* name : {"LeftArm", "RightArm"}) {
     const int joint =
@@ -29,7 +29,7 @@ Clip with_blows(Clip clip, double start_s, int times) {
     for (int f = 0; f < clip.frames; ++f) {
       double angle = 0;
       for (int k = 0; k < times; ++k) {
-        const double x = (f / clip.rate_hz - start_s - k) / 0.08;
+        const double x = (f / clip.rate_hz - start_s - k) / 0.03;
         angle += 2.2 * std::exp(-x * x);
       }
       clip.set_rotation(
