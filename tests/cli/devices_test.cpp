@@ -76,7 +76,8 @@ TEST_F(Devices, opencl_runs_every_kernel_of_build_and_query_and_finds_the_same) 
   EXPECT_EQ(built.at("sequences"), here.at("sequences"));
   EXPECT_EQ(built.at("functions"), here.at("functions"));
   EXPECT_NEAR(built.at("variance").get<double>(), here.at("variance").get<double>(), 1e-5);
-  EXPECT_NEAR(built.at("mean_joint_error_cm").get<double>(), here.at("mean_joint_error_cm").get<double>(), 1e-3);
+  // Expected scores of a smoothed space depend on its small eigenvalues, which a device has in float.
+  EXPECT_NEAR(built.at("mean_joint_error_cm").get<double>(), here.at("mean_joint_error_cm").get<double>(), 3e-3);
   const json same = query("here.kspace", "cpu");
   ASSERT_EQ(asked.at("matches").size(), same.at("matches").size());
   for (std::size_t i = 0; i < same.at("matches").size(); ++i) {
