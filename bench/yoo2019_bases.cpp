@@ -266,15 +266,17 @@ DecodedCurve decode_row(const ComponentBases& data, std::size_t basis, Eigen::In
   return out;
 }
 
-// Section 7.2: ours with the functions for 0.999 of the component's variance, the others with as many as the same error
-// takes (the 90th percentile over all curves, as in table 6).
+// Section 7.2 and figure 8: ours with the functions for 0.999 of the component's variance, the others with as many as its
+// error on this curve takes.
 std::vector<DecodedCurve> decode_alike(const ComponentBases& data, Eigen::Index row) {
   const auto reached = std::ranges::find_if(data.shares, [](double share) { return share >= 0.999; });
   const Eigen::Index count = std::min<Eigen::Index>(reached - data.shares.begin() + 1, data.shares.size());
-  const double error = data.errors(data.bases[0], count).percentile(0.9);
   std::vector<DecodedCurve> out{decode_row(data, 0, row, count)};
   for (const std::size_t basis : {std::size_t{2}, std::size_t{1}}) {
-    out.push_back(decode_row(data, basis, row, functions_needed(data, data.bases[basis], error).count));
+    const Eigen::Index all = data.bases[basis].coefficients.cols();
+    Eigen::Index n = 1;
+    while (n < all && decode_row(data, basis, row, n).error > out.front().error) ++n;
+    out.push_back(decode_row(data, basis, row, n));
   }
   return out;
 }
@@ -327,7 +329,7 @@ void add_figure_8(const PreparedSet& set, const std::vector<SampledPart>& parts,
       .rows = {},
       .notes = {"The curve changes more sharply than 999 of 1000 of the sequences' rotation curves. Functions of ours: "
                 "0.999 of the variance of all curves of its component, sequences at 128 points; the others: as many as "
-                "the same 90th percentile of the errors of all these curves takes.",
+                "the same error on this curve takes.",
                 "Variation: the sum of all changes from point to point; an error that oscillates has a large one."}};
   for (const DecodedCurve& one : decoded) {
     table.rows.push_back({one.name, static_cast<double>(one.functions), one.error,
