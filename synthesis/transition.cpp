@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 
@@ -168,8 +169,19 @@ struct Source {
   JointRates rates;
 };
 
+// How far poses between two others may put a foot through the ground: of frames [begin, end), below the other ones.
+double sink_of(const JointPositions& positions, int begin, int end) {
+  double inside = std::numeric_limits<double>::infinity();
+  double around = inside;
+  for (int f = 0; f < positions.frames; ++f) {
+    double& lowest = f >= begin && f < end ? inside : around;
+    for (int j = 0; j < positions.joints; ++j) lowest = std::min(lowest, positions.at(f, j).y());
+  }
+  return std::isfinite(inside) ? std::max(0.0, around - inside) : 0;
+}
+
 // The seam of a join, from 0.25 s before the overlap to 0.25 s after it, at the first motion's rate.
-SeamRatios ratios_of(const Source& first, const Source& second, const Join& join, const Skeleton& skeleton) {
+void measure_seam(const Source& first, const Source& second, const Skeleton& skeleton, Join& join) {
   constexpr double around_s = 0.25;
   const double step = 1 / first.sampler.rate_hz();
   const int before = static_cast<int>(std::ceil(around_s / step)) + 1;
@@ -186,8 +198,10 @@ SeamRatios ratios_of(const Source& first, const Source& second, const Join& join
   }
   const std::array<const JointRates*, 2> sources{&first.rates, &second.rates};
   const double begin_s = before * step - phase;
-  return seam_ratios(joint_rates(clip_from_curves(curves, skeleton)), begin_s, begin_s + join.duration_s,
-                     usual_rates(sources));
+  const Clip seam = clip_from_curves(curves, skeleton);
+  join.ratios = seam_ratios(joint_rates(seam), begin_s, begin_s + join.duration_s, usual_rates(sources));
+  join.sink_cm = sink_of(joint_positions(seam), static_cast<int>(std::ceil(begin_s / step)),
+                         static_cast<int>(std::floor((begin_s + join.duration_s) / step)) + 1);
 }
 
 Join join_by(const Connection& connection, const Source& first, const Source& second, double stretch,
@@ -208,7 +222,7 @@ Join join_by(const Connection& connection, const Source& first, const Source& se
     second_s[static_cast<std::size_t>(i)] = clock.second_s(overlap_s);
   }
   join.placement = ground_alignment(first.sampler, first_s, second.sampler, second_s, skeleton);
-  join.ratios = ratios_of(first, second, join, skeleton);
+  measure_seam(first, second, skeleton, join);
   return join;
 }
 
@@ -216,10 +230,14 @@ std::optional<Join> smoothest_join(const ConnectionSpace& space, const Connectio
                                    const ConnectionMotion& start, const Source& first, const Source& second,
                                    const Skeleton& skeleton, const TransitionOptions& options) {
   std::optional<Join> best;
+  // Up to 1 where a seam is as it may be.
+  const auto unease = [&](const Join& join) {
+    return std::max(join.ratios.worst() / options.largest_ratio, join.sink_cm / options.largest_sink_cm);
+  };
   const auto consider = [&](const Connection& connection, double stretch) {
     Join join = join_by(connection, first, second, stretch, skeleton);
-    if (!best || join.ratios.worst() < best->ratios.worst()) best = join;
-    return options.fixed || best->ratios.worst() <= options.largest_ratio;
+    if (!best || unease(join) < unease(*best)) best = join;
+    return options.fixed || unease(*best) <= 1;
   };
   std::vector<Connection> connections;
   const double window = std::min(end.length_s, start.length_s);
@@ -259,6 +277,10 @@ GroundMotion compose(const GroundMotion& outer, const GroundMotion& inner) {
 void TransitionOptions::validate() const {
   if (!(largest_ratio > 0)) {
     throw Error(ErrorKind::usage, {.found = fmt::format("largest_ratio = {}", largest_ratio), .expected = "above 0"});
+  }
+  if (!(largest_sink_cm > 0)) {
+    throw Error(ErrorKind::usage,
+                {.found = fmt::format("largest_sink_cm = {}", largest_sink_cm), .expected = "above 0"});
   }
 }
 

@@ -24,7 +24,8 @@
 namespace kinespace {
 
 struct TransitionOptions {
-  double largest_ratio = 1.01;  // > 0; a seam this smooth is not made longer for more
+  double largest_ratio = 1.01;  // > 0; a seam this smooth is not made longer for more ...
+  double largest_sink_cm = 3;   // > 0; ... where no joint goes deeper than this below those of both motions around it
   bool fixed = false;           // take the best connection of eq. 15 whatever its seam
 
   // Throws Error{usage} naming field, value and legal range.
@@ -38,6 +39,7 @@ struct Join {
   double duration_s = 0;   // of the overlap, by the output's clock
   double stretch = 1;      // the overlap is played so much slower than the motions alone would have it
   SeamRatios ratios;
+  double sink_cm = 0;  // how far the lowest joint in the overlap is below the lowest of 0.25 s before and after it
 };
 
 struct Transition {

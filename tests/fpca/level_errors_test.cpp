@@ -30,7 +30,7 @@ Clip with_blows(Clip clip, double start_s, int times) {
       double angle = 0;
       for (int k = 0; k < times; ++k) {
         const double x = (f / clip.rate_hz - start_s - k) / 0.03;
-        angle += 2.2 * std::exp(-x * x);
+        angle += 2.9 * std::exp(-x * x);
       }
       clip.set_rotation(
           joint, f, clip.rotation(joint, f) * Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitX())));
