@@ -1,6 +1,7 @@
 #include "cli/json_output.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -10,10 +11,18 @@
 namespace kinespace::cli {
 namespace {
 
+// Six digits; a share that is nearly 1 has as many as tell it from 1.
+std::string number_for_people(double value) {
+  std::string out = fmt::format("{:.6g}", value);
+  if (out == "1" && value < 1 - 1e-12)
+    out = fmt::format("{:.{}f}", value, static_cast<int>(-std::log10(1 - value)) + 1);
+  return out;
+}
+
 std::string shown(const Json& value) {
   if (value.is_string()) return printable(value.get_ref<const std::string&>());
   if (value.is_null()) return "-";
-  if (value.is_number_float()) return fmt::format("{:.6g}", value.get<double>());
+  if (value.is_number_float()) return number_for_people(value.get<double>());
   if (value.is_array()) return std::to_string(value.size());
   return value.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -199,9 +199,11 @@ TEST_F(Yoo2019, errors_of_table_2_are_those_of_decoding_by_hand) {
           for (Eigen::Index k = 0; k < group.functions.cols(); ++k) {
             double score = 0;
             for (int t = 0; t < points; ++t) score += weight(t) * (f(t, c) - group.mean(t)) * group.functions(t, k);
-            // Functions that the sequence does not need are left out (MotionSpace::drop_needless).
-            if (sequence.scores.row(k).isZero(0)) continue;
-            for (int t = 0; t < points; ++t) left[static_cast<std::size_t>(t)] -= score * group.functions(t, k);
+            // Functions that the sequence does not need are left out, and frames between the grid's points count, too.
+            const auto kept = static_cast<double>(sequence.scores(k, c));
+            const bool needed = !sequence.scores.row(k).isZero(0);
+            EXPECT_NEAR(kept, needed ? score : 0, 3e-3) << k;
+            for (int t = 0; t < points; ++t) left[static_cast<std::size_t>(t)] -= kept * group.functions(t, k);
           }
           double square = 0;
           for (int t = 0; t < points; ++t)
