@@ -15,7 +15,7 @@ PreparedSet load_prepared_set(const std::string& name, const std::vector<std::fi
     throw Error(ErrorKind::bad_input, {.file = input.string(),
                                        .found = "no such file or folder",
                                        .expected = "the clips of this bench",
-                                       .remedy = "name the folder that has them with --data"});
+                                       .remedy = "check the path, or name the folder that has the data with --data"});
   }
   const std::vector<std::filesystem::path> files = find_motion_files(inputs);
   PreparedSet out{name, std::vector<Clip>(files.size()), std::vector<PreparedClip>(files.size())};

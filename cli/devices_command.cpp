@@ -85,9 +85,14 @@ void print_table(const DeviceList& list, unsigned threads, const std::vector<Dev
 
 // Measures every device and keeps what was found.
 void calibrate_all(const DeviceList& list, Session& session) {
+  if (list.devices.empty()) {
+    session.note("there is no OpenCL device to measure");
+    return;
+  }
+  require_calibration_folder();
   for (std::size_t i = 0; i < list.devices.size(); ++i) keep_calibration(calibrate(choice(i), session.progress()));
   session.finish_progress();
-  if (!list.devices.empty()) session.note("measured, and kept in " + calibration_file().string());
+  session.note("measured, and kept in " + calibration_file().string());
 }
 
 struct DevicesOptions {

@@ -29,7 +29,8 @@ struct ExportOptions {
   std::filesystem::path output;
   std::optional<int> functions;
   std::optional<double> max_error_cm;
-  std::optional<bool> plant_feet;
+  bool plant_feet = false;
+  bool leave_feet = false;
   bool json = false;
 };
 
@@ -81,11 +82,13 @@ void choose_level(const ExportOptions& options, LibraryView& library, Session& s
 // Few functions let feet float, and then they are planted, unless an error was asked for: that is of the level as it is.
 bool plants(const ExportOptions& options, const Exported& exported, Session& session) {
   const bool few = exported.functions < planted_below && !options.max_error_cm;
-  if (!options.plant_feet.value_or(few)) return false;
+  if (options.leave_feet || !(options.plant_feet || few)) return false;
   if (exported.clip.feet) return true;
   if (exported.clip.rate_hz < least_contact_rate_hz) {
     session.note(fmt::format("{:.6g} frames a second are too few to tell when feet stand: no foot is planted",
                              exported.clip.rate_hz));
+  } else if (exported.clip.frames > most_frames_with_feet) {
+    session.note(fmt::format("feet are kept of clips of up to {} frames: no foot is planted", most_frames_with_feet));
   } else if (exported.row) {
     session.note(
         "the library knows of no foot of the clip that stands, and none is planted (libraries of before feet were kept "
@@ -235,10 +238,11 @@ void add_export(CLI::App& app, Session& session) {
           ->check(CLI::NonNegativeNumber)
           ->excludes(lod);
   command
-      ->add_flag_function(
-          "--plant-feet,!--no-plant-feet", [options](std::int64_t times) { options->plant_feet = times > 0; },
-          fmt::format("Feet stand where the original's stood (by itself below {} functions)", planted_below))
+      ->add_flag("--plant-feet", options->plant_feet,
+                 fmt::format("Feet stand where the original's stood (by itself below {} functions)", planted_below))
       ->excludes(max_error);
+  command->add_flag("--no-plant-feet", options->leave_feet, "Feet are where the functions have them")
+      ->excludes("--plant-feet");
   command->add_flag("--json", options->json, "Print what was written as one JSON object");
   session.files.reads(command, {"LIB", "--clip"});
   session.files.writes(command, {"--output"});

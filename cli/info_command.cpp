@@ -53,6 +53,9 @@ void draw_clip(const Clip& clip, const std::filesystem::path& picture) {
 Json describe_clip(const InfoOptions& options, Session& session) {
   const Clip clip = read_clip(options.file);
   session.note_doubts(clip);
+  if (!options.pictured_clip.empty()) {
+    throw Error(ErrorKind::usage, {.found = "--clip and a file that is a clip", .expected = "--clip with a library"});
+  }
   if (options.picture) draw_clip(clip, *options.picture);
   const double height = clip.skeleton.rest_height();
   return {{"kind", "clip"},
@@ -350,10 +353,15 @@ void run_info(InfoOptions& options, Session& session) {
                                    .expected = "one",
                                    .remedy = "name several with --repeats only"});
   }
+  if (options.picture && options.picture->extension() != ".svg") {
+    throw Error(ErrorKind::usage, {.found = fmt::format("--picture \"{}\"", options.picture->string()),
+                                   .expected = "a name that ends in .svg"});
+  }
   options.file = options.files.front();
   for (const Describer& describer : describers) {
     if (!describer.claims(options.file)) continue;
-    const Json description = describer.describe(options, session);
+    Json description = describer.describe(options, session);
+    if (options.picture) description["picture"] = options.picture->string();
     if (options.json) return print_json(description);
     print_fields(description);
     return print_lists(description, options.limit);

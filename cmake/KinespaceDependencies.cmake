@@ -16,7 +16,7 @@ pkg_check_modules(XXHASH REQUIRED IMPORTED_TARGET libxxhash)
 pkg_check_modules(ZSTD REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(LZMA REQUIRED IMPORTED_TARGET liblzma)
 find_package(BLAS REQUIRED)
-# Under the GPL. Nothing but kinespace::alglib links it, so without it that library is not made (alglib/licence.h).
+# Under the GPL. Nothing but kinespace::alglib links it, so without it that library is not made (kinespace/licence.h).
 if(KINESPACE_ALGLIB)
   find_package(ALGLIB REQUIRED)  # sets variables only
   add_library(kinespace_alglib_itself INTERFACE)

@@ -54,7 +54,13 @@ if(KINESPACE_ALGLIB)
 endif()
 
 install(FILES README.md CHANGELOG.md CONTRIBUTING.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+file(READ LICENSE copyright)
+if(KINESPACE_ALGLIB)
+  string(PREPEND copyright "The sources are under the Apache License 2.0 below. The command kinespace is linked with ALGLIB, which is under the
+GNU General Public License, version 2 or later (/usr/share/common-licenses/GPL-2): as a whole it is under the GPL.\n\n")
+endif()
+file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/copyright "${copyright}")
+install(FILES ${CMAKE_CURRENT_BINARY_DIR}/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 set(CPACK_GENERATOR DEB)
@@ -67,6 +73,9 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS pocl-opencl-icd)
 # For programs built on the libraries: what kinespaceConfig.cmake and kinespace.pc look for.
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libeigen3-dev, libarmadillo-dev, libopenblas-dev, libalglib-dev, ocl-icd-opencl-dev, \
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "libeigen3-dev, libarmadillo-dev, libopenblas-dev, ocl-icd-opencl-dev, \
 opencl-clhpp-headers, libfmt-dev, libtbb-dev, libxxhash-dev, libzstd-dev, liblzma-dev, libsqlite3-dev, libdraco-dev, libmeshoptimizer-dev, libpng-dev, nlohmann-json3-dev, pkg-config")
+if(KINESPACE_ALGLIB)
+  string(APPEND CPACK_DEBIAN_PACKAGE_SUGGESTS ", libalglib-dev")
+endif()
 include(CPack)

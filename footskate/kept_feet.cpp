@@ -194,7 +194,7 @@ FootContacts KeptFeet::frames() const {
 }
 
 std::optional<KeptFeet> keep_feet(const Clip& clip, const Placement& placement) {
-  if (clip.rate_hz < least_contact_rate_hz) return std::nullopt;
+  if (clip.rate_hz < least_contact_rate_hz || clip.frames > most_frames_with_feet) return std::nullopt;
   const std::optional<Feet> feet = find_feet(clip);
   if (!feet) return std::nullopt;
   const FootTracks tracks = foot_tracks(clip, *feet);

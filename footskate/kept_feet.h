@@ -51,8 +51,12 @@ struct KeptFeet {
 // Below this rate a foot stands and leaves between two frames, and contacts cannot be told.
 inline constexpr double least_contact_rate_hz = 20;
 
+// Of longer clips no feet are kept: finding them takes memory that grows with the clip.
+inline constexpr int most_frames_with_feet = 120'000;
+
 // The feet of a clip as it was read; `placement` is that of its curves. nullopt where there is nothing to plant: no legs
-// that can be told, fewer frames a second than least_contact_rate_hz, or no foot that ever stands.
+// that can be told, fewer frames a second than least_contact_rate_hz, more frames than most_frames_with_feet, or no foot
+// that ever stands.
 [[nodiscard]] std::optional<KeptFeet> keep_feet(const Clip& clip, const Placement& placement);
 
 // As bytes, and back. Reading throws Error{bad_input} naming `source` for joints that are no leg of the skeleton and

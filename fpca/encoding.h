@@ -6,6 +6,8 @@
 // inside, the excess is taken out, both by corrections that fade within `blend` of a sequence.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -36,7 +38,10 @@ struct EncodedSequence {
   int extra_detail = 0;         // 0 .. 240: fast motion takes more numbers at a level of detail (fpca/level_errors.h)
 
   // The level of its function set that it has at level of detail n of the clip: (1 + extra_detail / 16) n, rounded up.
-  [[nodiscard]] int level(int n) const { return n <= 0 ? n : n + (n * extra_detail + 15) / 16; }
+  [[nodiscard]] int level(int n) const {
+    constexpr int most = 1 << 20;  // all of any set
+    return n <= 0 ? n : static_cast<int>(std::min<std::int64_t>(most, n + (std::int64_t{n} * extra_detail + 15) / 16));
+  }
 };
 
 struct EncodedRun {

@@ -41,13 +41,12 @@ MeasuredLevel measure_level(const ClipDecoder& decoder, const ClipCurves& origin
 
 using MeasuredLevels = std::map<int, MeasuredLevel>;
 
-MeasuredLevels measure(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton, int levels,
-                       const EncodedClip& clip) {
-  MeasuredLevels out;
-  for (const int level : measured_levels(levels)) {
-    out.emplace(level, measure_level(decoder, original, skeleton, clip, level));
+// Measures the levels [from, to] among those that are there.
+void measure(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton, const EncodedClip& clip,
+             int from, int to, MeasuredLevels& levels) {
+  for (auto& [level, measured] : levels) {
+    if (level >= from && level <= to) measured = measure_level(decoder, original, skeleton, clip, level);
   }
-  return out;
 }
 
 constexpr int finest_level_meant = 10;  // beyond it errors are those of the recording: noise, lost markers
@@ -113,13 +112,17 @@ std::vector<int> measured_levels(int levels) {
 
 void measure_levels(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton, int levels,
                     EncodedClip& clip) {
-  MeasuredLevels measured = measure(decoder, original, skeleton, levels, clip);
+  MeasuredLevels measured;
+  for (const int level : measured_levels(levels)) measured[level] = {};
+  measure(decoder, original, skeleton, clip, 1, levels, measured);
   constexpr int most_rounds = 4;
-  bool changed = give_detail(measured, clip);
+  const bool any = give_detail(measured, clip);
+  bool changed = any;
   for (int round = 0; changed && round < most_rounds; ++round) {
-    measured = measure(decoder, original, skeleton, levels, clip);
+    measure(decoder, original, skeleton, clip, 1, finest_level_meant, measured);
     changed = round + 1 < most_rounds && raise_detail(measured, clip);
   }
+  if (any) measure(decoder, original, skeleton, clip, finest_level_meant + 1, levels, measured);
   clip.levels.clear();
   for (const auto& [level, of_level] : measured) clip.levels.push_back({level, of_level.error});
   clip.error =

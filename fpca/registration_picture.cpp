@@ -195,7 +195,10 @@ class RegistrationPicture {
                     const std::string& title) {
     svg_.rectangle({left, overlay_top}, {width, overlay_height}, "#f7f7f7");
     svg_.label({left, overlay_top - 10}, title, "start", 14, ink);
-    for (const Eigen::VectorXd& s : stretches) {
+    constexpr std::size_t most_drawn = 200;  // evenly chosen
+    const std::size_t step = (stretches.size() + most_drawn - 1) / most_drawn;
+    for (std::size_t k = 0; k < stretches.size(); k += step) {
+      const Eigen::VectorXd& s = stretches[k];
       std::vector<Point> points;
       for (int i = 0; i < overlay_points; ++i) {
         points.emplace_back(left + width * i / (overlay_points - 1), scale.y(s(i)));

@@ -64,6 +64,9 @@ struct KnownCalibrations {
 // Never throws for what is in the file: what cannot be read as it was written is as if it were not there.
 [[nodiscard]] KnownCalibrations read_calibrations(const std::filesystem::path& file = calibration_file());
 
+// Makes the folder of the file; throws Error{machine} when that cannot be done or a folder is in the file's place.
+void require_calibration_folder(const std::filesystem::path& file = calibration_file());
+
 // Puts it into the file, in place of an older one of the same device; makes the folder. Throws Error{machine} when that
 // cannot be done.
 void keep_calibration(const DeviceCalibration& calibration, const std::filesystem::path& file = calibration_file());

@@ -66,7 +66,9 @@ std::optional<KernelSpeed> speed_of(const Json& object) {
     if (!number) return std::nullopt;
     out.*field = *number;
   }
-  return out.processor_rate > 0 && out.device_rate > 0 ? std::optional(out) : std::nullopt;
+  // Operations a second of anything that computes.
+  const auto plausible = [](double rate) { return rate > 1e3 && rate < 1e18; };
+  return plausible(out.processor_rate) && plausible(out.device_rate) ? std::optional(out) : std::nullopt;
 }
 
 std::optional<DeviceCalibration> calibration_of(const Json& object) {
@@ -87,7 +89,10 @@ std::optional<DeviceCalibration> calibration_of(const Json& object) {
     if (!speed) return std::nullopt;
     out.kernels.push_back(*speed);
   }
-  return out.kernels.size() == kernel_families.size() ? std::optional(std::move(out)) : std::nullopt;
+  const bool each = std::ranges::all_of(kernel_families, [&](KernelFamily family) {
+    return std::ranges::count(out.kernels, family, &KernelSpeed::family) == 1;
+  });
+  return each ? std::optional(std::move(out)) : std::nullopt;
 }
 
 std::string read_text_of(const fs::path& file) {
@@ -140,12 +145,24 @@ KnownCalibrations read_calibrations(const fs::path& file) {
                                   .remedy = "it is ignored; `kinespace devices --calibrate` measures again"})};
 }
 
-void keep_calibration(const DeviceCalibration& calibration, const fs::path& file) {
+void require_calibration_folder(const fs::path& file) {
   if (file.empty()) {
-    throw Error(ErrorKind::machine, {.found = "neither XDG_CACHE_HOME nor HOME",
+    throw Error(ErrorKind::machine, {.found = "neither XDG_CACHE_HOME nor HOME names an absolute folder",
                                      .expected = "a folder to keep calibrations in",
                                      .remedy = "set XDG_CACHE_HOME"});
   }
+  std::error_code failed;
+  fs::create_directories(file.parent_path(), failed);
+  if (failed || fs::is_directory(file)) {
+    throw Error(ErrorKind::machine, {.file = (failed ? file.parent_path() : file).string(),
+                                     .found = failed ? failed.message() : "a folder",
+                                     .expected = "a folder to keep the file of calibrations in",
+                                     .remedy = "set XDG_CACHE_HOME to one that can be written to"});
+  }
+}
+
+void keep_calibration(const DeviceCalibration& calibration, const fs::path& file) {
+  require_calibration_folder(file);
   KnownCalibrations known = read_calibrations(file);
   std::erase_if(known.devices, [&](const DeviceCalibration& other) {
     return other.device == calibration.device && other.platform == calibration.platform;
@@ -155,13 +172,6 @@ void keep_calibration(const DeviceCalibration& calibration, const fs::path& file
   for (const DeviceCalibration& one : known.devices) devices.push_back(to_json(one));
   const Json root{{"kind", kFileKind}, {"version", kFileVersion}, {"devices", std::move(devices)}};
   std::error_code failed;
-  fs::create_directories(file.parent_path(), failed);
-  if (failed) {
-    throw Error(ErrorKind::machine, {.file = file.parent_path().string(),
-                                     .found = failed.message(),
-                                     .expected = "a folder to keep calibrations in",
-                                     .remedy = "set XDG_CACHE_HOME to one that can be written to"});
-  }
   // Ours, whatever damage makes it look like.
   if (!known.damage.empty() && fs::is_regular_file(file, failed)) fs::remove(file, failed);
   write_file_atomically(file, root.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");

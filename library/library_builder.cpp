@@ -237,7 +237,9 @@ class SpaceWriter {
   void complete(PreparedClip prepared, Ready& out) const {
     round_to_stored(out.clip, built_.space);
     measure_levels(decoder_, prepared.curves, prepared.skeleton, built_.space.levels(), out.clip);
-    out.clip.feet = keep_feet(clip_from_curves(prepared.curves, prepared.skeleton), prepared.curves.placement);
+    if (prepared.curves.frames() <= most_frames_with_feet) {
+      out.clip.feet = keep_feet(clip_from_curves(prepared.curves, prepared.skeleton), prepared.curves.placement);
+    }
     out.skeleton = std::move(prepared.skeleton);
   }
 
@@ -284,7 +286,10 @@ void transfer_clips(Library& library, std::int64_t space_id, const RegisteredSpa
                     {.name = row.name, .rate_hz = row.rate_hz, .frames = static_cast<int>(row.frames)}, row.name);
     const JointPositions before = joint_positions(clip_from_curves(decode(from, clip), skeleton));
     for (EncodedRun& run : clip.runs) {
-      for (EncodedSequence& s : run.sequences) s.scores = to.of(s.cycles).transfer(s.scores, from.of(s.cycles));
+      for (EncodedSequence& s : run.sequences) {
+        s.scores = to.of(s.cycles).transfer(s.scores, from.of(s.cycles));
+        to.of(s.cycles).drop_needless(s.scores);
+      }
     }
     round_to_stored(clip, to);
     // Its own curves are not there any more: errors of levels are not known any more, and with what the transfer moves

@@ -43,8 +43,8 @@ class LibraryView {
   [[nodiscard]] ClipCurves curves(const ClipRow& row, int functions = -1);
   [[nodiscard]] Clip clip(const ClipRow& row, int functions = -1);
 
-  // A clip outside the library, encoded by the functions of its space as a build would and with its feet
-  // (footskate/kept_feet.h). Throws Error{bad_input} naming `file` when the library has no space for its skeleton.
+  // A clip outside the library, encoded by the functions of its space, without warps, with its detail
+  // (fpca/level_errors.h) and feet (footskate/kept_feet.h). Throws Error{bad_input} naming `file` when the library has no space for its skeleton.
   [[nodiscard]] EncodedClip encode(const Clip& clip, const std::filesystem::path& file);
   // The space that it is encoded in. Throws likewise.
   [[nodiscard]] const RegisteredSpace& require_space_for(const Clip& clip, const std::filesystem::path& file);

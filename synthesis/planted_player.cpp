@@ -46,9 +46,10 @@ PlantedPlayer::PlantedPlayer(Player player, const EncodedClip& clip, const Skele
 
 Eigen::Vector3f PlantedPlayer::pose(double time_s, int functions, std::span<float> rotations) const {
   const Eigen::Vector3f root = player_.pose(time_s, functions, rotations);
-  if (!legs_ || functions < 0 || functions >= static_cast<int>(legs_->ends.size())) return root;
+  const int level = functions < 0 ? player_.functions() : std::min(functions, player_.functions());
+  if (!legs_ || level >= static_cast<int>(legs_->ends.size())) return root;
   const double frame = player_.frame_at(time_s);
-  const FootPlanter::Ends& ends = legs_->ends[static_cast<std::size_t>(functions)];
+  const FootPlanter::Ends& ends = legs_->ends[static_cast<std::size_t>(level)];
   for (int side = 0; side < 2; ++side) {
     const LegChain& chain = legs_->chains[static_cast<std::size_t>(side)];
     const auto turned = legs_->planter.plant(side, frame, chain.state(root, rotations), ends);

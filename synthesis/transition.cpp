@@ -169,7 +169,8 @@ struct Source {
   JointRates rates;
 };
 
-// How far poses between two others may put a foot through the ground: of frames [begin, end), below the other ones.
+// How far the lowest joint of frames [begin, end) is below the lowest of the others: poses between two others may put a
+// foot through the ground.
 double sink_of(const JointPositions& positions, int begin, int end) {
   double inside = std::numeric_limits<double>::infinity();
   double around = inside;
@@ -230,14 +231,16 @@ std::optional<Join> smoothest_join(const ConnectionSpace& space, const Connectio
                                    const ConnectionMotion& start, const Source& first, const Source& second,
                                    const Skeleton& skeleton, const TransitionOptions& options) {
   std::optional<Join> best;
-  // Up to 1 where a seam is as it may be.
-  const auto unease = [&](const Join& join) {
-    return std::max(join.ratios.worst() / options.largest_ratio, join.sink_cm / options.largest_sink_cm);
+  // A seam that cannot be seen comes first, then feet above the ground.
+  const auto smooth = [&](const Join& join) { return join.ratios.worst() <= options.largest_ratio; };
+  const auto better = [&](const Join& a, const Join& b) {
+    if (smooth(a) != smooth(b)) return smooth(a);
+    return smooth(a) ? a.sink_cm < b.sink_cm : a.ratios.worst() < b.ratios.worst();
   };
   const auto consider = [&](const Connection& connection, double stretch) {
     Join join = join_by(connection, first, second, stretch, skeleton);
-    if (!best || unease(join) < unease(*best)) best = join;
-    return options.fixed || unease(*best) <= 1;
+    if (!best || better(join, *best)) best = join;
+    return options.fixed || (smooth(*best) && best->sink_cm <= options.largest_sink_cm);
   };
   std::vector<Connection> connections;
   const double window = std::min(end.length_s, start.length_s);

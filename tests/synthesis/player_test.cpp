@@ -130,6 +130,17 @@ TEST(Player, frames_of_sample_clips_are_those_of_decoding) {
   expect_decoded(sample_clips());
 }
 
+TEST(Player, frames_of_sequences_with_more_detail_are_those_of_decoding) {
+  Encoded encoded = sample_clips();
+  int number = 0;
+  for (EncodedClip& clip : encoded.clips) {
+    for (EncodedRun& run : clip.runs) {
+      for (EncodedSequence& s : run.sequences) s.extra_detail = 24 * (number++ % 3);
+    }
+  }
+  expect_decoded(encoded);
+}
+
 TEST(Player, frames_are_those_of_decoding_in_every_grouping) {
   for (const Grouping grouping : {Grouping::per_component, Grouping::per_joint_component}) {
     const Encoded encoded = sample_clips(grouping);
