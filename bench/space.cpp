@@ -132,7 +132,10 @@ double numbers_a_second(const RegisteredSpace& space, const std::vector<EncodedC
     for (const EncodedRun& run : clip.runs) {
       for (const EncodedSequence& s : run.sequences) {
         const MotionSpace& set = space.of(s.cycles);
-        numbers += set.rows_at(s.level(level)) - (set.options().pinned ? 1 : 0);
+        Eigen::Index needed = s.scores.rows();  // behind them there are zeros, which are not kept
+        while (needed > 0 && s.scores.row(needed - 1).isZero(0)) --needed;
+        numbers += static_cast<double>(std::min<Eigen::Index>(set.rows_at(s.level(level)), needed));
+        if (set.options().pinned) numbers -= 1;
       }
     }
   }
