@@ -215,9 +215,9 @@ void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) 
   const auto row = [&](const char* name, double value, double bar) {
     report.results.push_back({.name = name, .data = data, .value = value, .unit = "x", .bar = bar});
   };
-  row("seam: largest joint speed over the usual, median_of of 200 random pairs", median_of(speed), 1);
+  row("seam: largest joint speed over the usual, median of 200 random pairs", median_of(speed), 1);
   row("seam: the same, worst", std::ranges::max(speed), 2);
-  row("seam: largest joint acceleration over the usual, median_of of 200 random pairs", median_of(acceleration), 1);
+  row("seam: largest joint acceleration over the usual, median of 200 random pairs", median_of(acceleration), 1);
   row("seam: the same, worst", std::ranges::max(acceleration), 2);
 }
 
@@ -231,7 +231,7 @@ void path_rows(const std::string& data, LibraryView& view, BenchReport& report) 
     if (!plan) continue;
     for (const Join& join : plan->transition.joins) ratios.push_back(join.ratios.worst());
   }
-  report.results.push_back({.name = "seam: speed or acceleration, median_of of the seams of 60 ways through the graph",
+  report.results.push_back({.name = "seam: speed or acceleration, median of the seams of 60 ways through the graph",
                             .data = data,
                             .value = median_of(ratios),
                             .unit = "x",
