@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "kinespace/motion/joint_distance.h"
 #include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
@@ -18,24 +19,13 @@ struct MeasuredLevel {
 MeasuredLevel measure_level(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton,
                             const EncodedClip& clip, int level) {
   MeasuredLevel out;
-  double sum = 0;
-  double count = 0;
-  double worst = 0;
+  JointDistance distance;
   decoder.decode_in_parts(clip, level, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
     const auto read = original.values.middleRows(first, rows.rows());
-    const JointPositions a = joint_positions(clip_of_frames(original, read, first, skeleton));
-    const JointPositions b = joint_positions(clip_of_frames(original, rows, first, skeleton));
-    double largest = 0;
-    for (std::size_t i = 0; i < a.values.size(); ++i) {
-      const double e = (a.values[i] - b.values[i]).norm();
-      sum += e;
-      largest = std::max(largest, e);
-    }
-    count += static_cast<double>(a.values.size());
-    worst = std::max(worst, largest);
-    out.worst.push_back(largest);
+    out.worst.push_back(distance.add(joint_positions(clip_of_frames(original, read, first, skeleton)),
+                                     joint_positions(clip_of_frames(original, rows, first, skeleton))));
   });
-  out.error = {.mean_joint_error_cm = sum / count, .max_joint_error_cm = worst};
+  out.error = {.mean_joint_error_cm = distance.mean(), .max_joint_error_cm = distance.largest()};
   return out;
 }
 

@@ -15,6 +15,7 @@
 #include "kinespace/library/detail/space_codec.h"
 #include "kinespace/library/library_view.h"
 #include "kinespace/motion/file_formats.h"
+#include "kinespace/motion/joint_distance.h"
 #include "kinespace/motion/kinematics.h"
 #include "kinespace/motion/plausibility.h"
 #include "kinespace/motion/read.h"
@@ -123,17 +124,6 @@ PreparedSource source_of_imports(const std::vector<const Import*>& imports, cons
             clip->curves.name = import.name;
             return *std::move(clip);
           }};
-}
-
-MeasuredError distance(const JointPositions& a, const JointPositions& b) {
-  double sum = 0;
-  double worst = 0;
-  for (std::size_t i = 0; i < a.values.size(); ++i) {
-    const double e = (a.values[i] - b.values[i]).norm();
-    sum += e;
-    worst = std::max(worst, e);
-  }
-  return {.mean_joint_error_cm = sum / static_cast<double>(a.values.size()), .max_joint_error_cm = worst};
 }
 
 void count_cycles(const EncodedClip& clip, LibraryReport& report) {
@@ -294,9 +284,10 @@ void transfer_clips(Library& library, std::int64_t space_id, const RegisteredSpa
     round_to_stored(clip, to);
     // Its own curves are not there any more: errors of levels are not known any more, and with what the transfer moves
     // added, its error is never less than it is.
-    const MeasuredError moved = distance(before, joint_positions(clip_from_curves(decode(to, clip), skeleton)));
-    clip.error.mean_joint_error_cm += moved.mean_joint_error_cm;
-    clip.error.max_joint_error_cm += moved.max_joint_error_cm;
+    JointDistance moved;
+    moved.add(before, joint_positions(clip_from_curves(decode(to, clip), skeleton)));
+    clip.error.mean_joint_error_cm += moved.mean();
+    clip.error.max_joint_error_cm += moved.largest();
     clip.levels.clear();
     const std::vector<float> old_vector = library.retrieval_vector(row.id);
     if (old_vector.size() != clips_from.dimensions()) {

@@ -6,11 +6,11 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "examples/sample_motions.h"
 #include "kinespace/codecs/registry.h"
 #include "kinespace/motion/error_measures.h"
 #include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
+#include "tests/cli/sample_clips.h"
 #include "tests/support/data.h"
 
 namespace kinespace::test {
@@ -22,10 +22,7 @@ class CodecCommands : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    std::filesystem::create_directory(*folder_ / "clips");
-    for (const SampleMotion& motion : sample_library({.takes = 1})) {
-      write_clip(*folder_ / "clips" / (motion.clip.name + ".bvh"), motion.clip);
-    }
+    write_sample_clips(*folder_ / "clips");
     write_text(*folder_ / "other.bvh", walking_bvh(200, 1));
   }
   static void TearDownTestSuite() { folder_.reset(); }

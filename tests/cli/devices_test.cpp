@@ -8,10 +8,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "examples/sample_motions.h"
 #include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
-#include "tests/kernels/opencl_device.h"
+#include "tests/cli/sample_clips.h"
+#include "tests/support/opencl_device.h"
 
 namespace kinespace::test {
 namespace {
@@ -38,10 +38,7 @@ class Devices : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    std::filesystem::create_directory(*folder_ / "clips");
-    for (const SampleMotion& motion : sample_library({.takes = 1})) {
-      write_clip(*folder_ / "clips" / (motion.clip.name + ".bvh"), motion.clip);
-    }
+    write_sample_clips(*folder_ / "clips");
   }
   static void TearDownTestSuite() { folder_.reset(); }
   static std::string path(const char* name) { return (*folder_ / name).string(); }

@@ -17,6 +17,7 @@
 #include "kinespace/motion/read.h"
 #include "kinespace/storage/library_build.h"
 #include "tests/cli/run_command.h"
+#include "tests/cli/sample_clips.h"
 #include "tests/support/data.h"
 
 namespace kinespace::test {
@@ -28,10 +29,7 @@ class LibraryCommands : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    std::filesystem::create_directory(clips());
-    for (const SampleMotion& motion : sample_library({.takes = 1})) {
-      write_clip(clips() / (motion.clip.name + ".bvh"), motion.clip);
-    }
+    write_sample_clips(clips());
     // A name that a shell, an SQL statement or a path splitter could trip over.
     std::filesystem::copy_file(clips() / "walk_normal_001.bvh", clips() / "it's a \"walk\": 1.bvh");
     built_ = run_command({"build", clips().string(), "-o", library().string(), "--json"});

@@ -8,6 +8,7 @@
 #include "examples/sample_motions.h"
 #include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
+#include "tests/cli/sample_clips.h"
 #include "tests/support/data.h"
 
 namespace kinespace::test {
@@ -19,10 +20,7 @@ class SynthesisCommands : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    std::filesystem::create_directory(*folder_ / "clips");
-    for (const SampleMotion& motion : sample_library({.takes = 1})) {
-      write_clip(*folder_ / "clips" / (motion.clip.name + ".bvh"), motion.clip);
-    }
+    write_sample_clips(*folder_ / "clips");
     write_clip(*folder_ / "clips" / "stand_short_001.bvh", make_stand({.duration_s = 0.4}).clip);
     write_text(*folder_ / "clips" / "other_tree_001.bvh", walking_bvh(200, 1));
     built_ = run_command({"build", out("clips"), "-o", library(), "--by-skeleton"});

@@ -11,12 +11,12 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "examples/sample_motions.h"
 #include "kinespace/fpca/space_builder.h"
 #include "kinespace/library/library_builder.h"
 #include "kinespace/motion/error_measures.h"
 #include "kinespace/motion/read.h"
 #include "tests/cli/run_command.h"
+#include "tests/cli/sample_clips.h"
 #include "tests/support/data.h"
 
 namespace kinespace::test {
@@ -59,10 +59,7 @@ class Yoo2019 : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = std::make_unique<TemporaryFolder>();
-    std::filesystem::create_directory(clips());
-    for (const SampleMotion& motion : sample_library({.takes = 1})) {
-      write_clip(clips() / (motion.clip.name + ".bvh"), motion.clip);
-    }
+    write_sample_clips(clips());
     // One of the paper's own names, so that its column has a number of ours.
     std::filesystem::copy_file(clips() / "walk_normal_001.bvh", clips() / "09_06.bvh");
     write_golden_case(*folder_ / "golden/case");

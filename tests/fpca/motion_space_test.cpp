@@ -12,6 +12,7 @@
 #include "tests/fpca/sample_curves.h"
 #include "tests/fpca/sample_space.h"
 #include "tests/support/data.h"
+#include "tests/support/opencl_device.h"
 
 namespace kinespace {
 namespace {
@@ -271,10 +272,7 @@ TEST(MotionSpace, warps_that_win_nothing_on_held_out_clips_are_not_kept) {
 }
 
 TEST(MotionSpace, an_opencl_device_finds_the_same_functions_and_scores) {
-  if (list_devices().empty()) {
-    if (test::data_required()) FAIL() << "no OpenCL device";
-    GTEST_SKIP() << "no OpenCL device on this machine";
-  }
+  KINESPACE_REQUIRE_OPENCL();
   const Compute device = Compute::open("opencl");
   SpaceBuildOptions options;
   options.align = false;
@@ -293,52 +291,55 @@ TEST(MotionSpace, an_opencl_device_finds_the_same_functions_and_scores) {
   EXPECT_LT((cpu.runs[0].sequences[0].scores - gpu.runs[0].sequences[0].scores).cwiseAbs().maxCoeff(), 1e-4);
 }
 
-// By every grouping, pinned or not, and many clips or one at a time: the scores are the same to a device's precision.
-TEST(MotionSpace, clips_encoded_together_are_those_encoded_alone) {
+// The largest difference of a score between clips that are encoded together, where `compute` says, and alone.
+float difference_of_encoding_together(Grouping grouping, const Compute& compute) {
+  SpaceBuildOptions options;
+  options.align = false;
+  options.space.grouping = grouping;
+  options.space.pinned = grouping == Grouping::all_together;
+  const BuiltSpace built = build_space(source_of(prepared_samples()), options);
   std::vector<ClipCurves> curves;
   for (const PreparedClip& clip : prepared_samples()) curves.push_back(clip.curves);
-  for (ClipCurves& clip : curves) sample_space().space.apply_references(clip.values);
-  for (const Grouping grouping : {Grouping::all_together, Grouping::per_component}) {
-    SpaceBuildOptions options;
-    options.align = false;
-    options.space.grouping = grouping;
-    options.space.pinned = grouping == Grouping::all_together;
-    const BuiltSpace built = build_space(source_of(prepared_samples()), options);
-    std::vector<ClipToEncode> together;
-    for (std::size_t i = 0; i < curves.size(); ++i) {
-      together.push_back({&curves[i], built.runs_of(static_cast<int>(i), prepared_samples()[i].runs), {}});
-    }
-    const auto largest_difference = [&](const Compute& compute) {
-      const std::vector<EncodedClip> found = encode(built.space, together, compute);
-      float worst = 0;
-      for (std::size_t i = 0; i < found.size(); ++i) {
-        const EncodedClip alone = encode(built.space, curves[i], together[i].runs);
-        EXPECT_EQ(found[i].sequence_count(), alone.sequence_count());
-        for (std::size_t r = 0; r < alone.runs.size(); ++r) {
-          for (std::size_t s = 0; s < alone.runs[r].sequences.size(); ++s) {
-            const ScoreMatrix& a = alone.runs[r].sequences[s].scores;
-            const ScoreMatrix& b = found[i].runs[r].sequences[s].scores;
-            EXPECT_EQ(a.rows(), b.rows());
-            worst = std::max(worst, (a - b).cwiseAbs().maxCoeff());
-          }
-        }
+  std::vector<ClipToEncode> together;
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    built.space.apply_references(curves[i].values);
+    together.push_back({&curves[i], built.runs_of(static_cast<int>(i), prepared_samples()[i].runs), {}});
+  }
+  const std::vector<EncodedClip> found = encode(built.space, together, compute);
+  float worst = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const EncodedClip alone = encode(built.space, curves[i], together[i].runs);
+    EXPECT_EQ(found[i].sequence_count(), alone.sequence_count());
+    for (std::size_t r = 0; r < alone.runs.size(); ++r) {
+      for (std::size_t s = 0; s < alone.runs[r].sequences.size(); ++s) {
+        const ScoreMatrix& a = alone.runs[r].sequences[s].scores;
+        const ScoreMatrix& b = found[i].runs[r].sequences[s].scores;
+        EXPECT_EQ(a.rows(), b.rows());
+        worst = std::max(worst, (a - b).cwiseAbs().maxCoeff());
       }
-      return worst;
-    };
-    EXPECT_EQ(largest_difference(Compute::open("cpu")), 0);
-    if (list_devices().empty()) continue;  // the test above says so
+    }
+  }
+  return worst;
+}
+
+TEST(MotionSpace, clips_encoded_together_are_those_encoded_alone) {
+  for (const Grouping grouping : {Grouping::all_together, Grouping::per_component}) {
+    EXPECT_EQ(difference_of_encoding_together(grouping, Compute::open("cpu")), 0);
+  }
+}
+
+TEST(MotionSpace, clips_encoded_together_on_a_device_are_those_encoded_alone) {
+  KINESPACE_REQUIRE_OPENCL();
+  for (const Grouping grouping : {Grouping::all_together, Grouping::per_component}) {
     const Compute device = Compute::open("opencl");
-    EXPECT_LT(largest_difference(device), 1e-4F);
+    EXPECT_LT(difference_of_encoding_together(grouping, device), 1e-4F);
     EXPECT_GT(device.uses()[static_cast<std::size_t>(KernelFamily::projection)].launches, 0U);
     EXPECT_EQ(device.uses()[static_cast<std::size_t>(KernelFamily::projection)].processor_calls, 0U);
   }
 }
 
 TEST(MotionSpace, smoothing_runs_on_the_device_and_finds_the_same) {
-  if (list_devices().empty()) {
-    if (test::data_required()) FAIL() << "no OpenCL device";
-    GTEST_SKIP() << "no OpenCL device on this machine";
-  }
+  KINESPACE_REQUIRE_OPENCL();
   const CurveMatrix curves = test::sample_curves(200, 70, 0.1);
   const FpcaOptions options{
       .mean = MeanEstimate::smooth, .smooth_covariance = true, .estimate_noise = true, .count = 5};

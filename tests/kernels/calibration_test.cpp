@@ -13,8 +13,8 @@
 #include "kinespace/base/file.h"
 #include "kinespace/kernels/dtw.h"
 #include "kinespace/kernels/keyframe_distance.h"
-#include "tests/kernels/opencl_device.h"
 #include "tests/support/data.h"
+#include "tests/support/opencl_device.h"
 
 namespace kinespace {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "kinespace/base/error.h"
 #include "kinespace/kernels/dtw.h"
-#include "tests/kernels/opencl_device.h"
+#include "tests/support/opencl_device.h"
 
 namespace kinespace {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "kinespace/base/error.h"
 #include "tests/kernels/dtw_support.h"
-#include "tests/kernels/opencl_device.h"
+#include "tests/support/opencl_device.h"
 
 namespace kinespace {
 namespace {

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "kinespace/kernels/kernel_descriptor.h"
-#include "tests/kernels/opencl_device.h"
+#include "tests/support/opencl_device.h"
 
 namespace kinespace {
 namespace {

@@ -9,6 +9,7 @@
 #include "kinespace/kernels/detail/dtw.h"
 #include "tests/support/data.h"
 #include "tests/support/library_folder.h"
+#include "tests/support/opencl_device.h"
 
 namespace kinespace {
 namespace {
@@ -83,10 +84,7 @@ TEST_F(Retrieval, the_list_of_vectors_equals_brute_force) {
 }
 
 TEST_F(Retrieval, a_device_leaves_the_list_as_it_is) {
-  if (list_devices().empty()) {
-    if (test::data_required()) FAIL() << "no OpenCL device";
-    GTEST_SKIP() << "no OpenCL device on this machine";
-  }
+  KINESPACE_REQUIRE_OPENCL();
   LibraryView view(folder_->library());
   const Compute device = Compute::open("opencl");
   for (const ClipRow& row : view.library().clips()) {
