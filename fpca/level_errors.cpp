@@ -16,14 +16,37 @@ struct MeasuredLevel {
   std::vector<double> worst;
 };
 
-MeasuredLevel measure_level(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton,
-                            const EncodedClip& clip, int level) {
+// The clip as it was read, part by part as it is decoded. Of a clip that is not long the joints are found once for all
+// levels.
+class Original {
+ public:
+  Original(const ClipCurves& curves, const Skeleton& skeleton) : curves_(curves), skeleton_(skeleton) {}
+
+  // Of the rows from a frame on, as they are in the original or as `values` has them.
+  [[nodiscard]] JointPositions joints(int first, const Eigen::Ref<const SampleMatrix>& values) const {
+    return joint_positions(clip_of_frames(curves_, values, first, skeleton_));
+  }
+  // Parts must come in the same order at every level.
+  double add(std::size_t part, int first, const Eigen::Ref<const SampleMatrix>& rows, JointDistance& distance) {
+    constexpr int most_kept_frames = 10'000;
+    if (curves_.frames() > most_kept_frames) {
+      return distance.add(joints(first, curves_.values.middleRows(first, rows.rows())), joints(first, rows));
+    }
+    if (part == kept_.size()) kept_.push_back(joints(first, curves_.values.middleRows(first, rows.rows())));
+    return distance.add(kept_[part], joints(first, rows));
+  }
+
+ private:
+  const ClipCurves& curves_;
+  const Skeleton& skeleton_;
+  std::vector<JointPositions> kept_;  // by part
+};
+
+MeasuredLevel measure_level(const ClipDecoder& decoder, Original& original, const EncodedClip& clip, int level) {
   MeasuredLevel out;
   JointDistance distance;
   decoder.decode_in_parts(clip, level, {}, [&](int first, const Eigen::Ref<const SampleMatrix>& rows) {
-    const auto read = original.values.middleRows(first, rows.rows());
-    out.worst.push_back(distance.add(joint_positions(clip_of_frames(original, read, first, skeleton)),
-                                     joint_positions(clip_of_frames(original, rows, first, skeleton))));
+    out.worst.push_back(original.add(out.worst.size(), first, rows, distance));
   });
   out.error = {.mean_joint_error_cm = distance.mean(), .max_joint_error_cm = distance.largest()};
   return out;
@@ -32,10 +55,10 @@ MeasuredLevel measure_level(const ClipDecoder& decoder, const ClipCurves& origin
 using MeasuredLevels = std::map<int, MeasuredLevel>;
 
 // Measures the levels [from, to] among those that are there.
-void measure(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton, const EncodedClip& clip,
-             int from, int to, MeasuredLevels& levels) {
+void measure(const ClipDecoder& decoder, Original& original, const EncodedClip& clip, int from, int to,
+             MeasuredLevels& levels) {
   for (auto& [level, measured] : levels) {
-    if (level >= from && level <= to) measured = measure_level(decoder, original, skeleton, clip, level);
+    if (level >= from && level <= to) measured = measure_level(decoder, original, clip, level);
   }
 }
 
@@ -102,21 +125,21 @@ std::vector<int> measured_levels(int levels) {
 
 void measure_levels(const ClipDecoder& decoder, const ClipCurves& original, const Skeleton& skeleton, int levels,
                     EncodedClip& clip) {
+  Original read(original, skeleton);
   MeasuredLevels measured;
   for (const int level : measured_levels(levels)) measured[level] = {};
-  measure(decoder, original, skeleton, clip, 1, levels, measured);
+  measure(decoder, read, clip, 1, levels, measured);
   constexpr int most_rounds = 4;
   const bool any = give_detail(measured, clip);
   bool changed = any;
   for (int round = 0; changed && round < most_rounds; ++round) {
-    measure(decoder, original, skeleton, clip, 1, finest_level_meant, measured);
+    measure(decoder, read, clip, 1, finest_level_meant, measured);
     changed = round + 1 < most_rounds && raise_detail(measured, clip);
   }
-  if (any) measure(decoder, original, skeleton, clip, finest_level_meant + 1, levels, measured);
+  if (any) measure(decoder, read, clip, finest_level_meant + 1, levels, measured);
   clip.levels.clear();
   for (const auto& [level, of_level] : measured) clip.levels.push_back({level, of_level.error});
-  clip.error =
-      clip.levels.empty() ? measure_level(decoder, original, skeleton, clip, -1).error : clip.levels.back().error;
+  clip.error = clip.levels.empty() ? measure_level(decoder, read, clip, -1).error : clip.levels.back().error;
 }
 
 }  // namespace kinespace
