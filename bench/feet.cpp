@@ -9,10 +9,10 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/report.h"
 #include "examples/contact_training.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/footskate/cleanup.h"
 #include "kinespace/footskate/skate_measures.h"
 #include "kinespace/library/library_builder.h"
@@ -130,7 +130,7 @@ Outcome outcome_of(const Skating& skating, bool twice) {
 
 std::vector<Outcome> outcomes(const std::vector<Skating>& all, bool twice) {
   std::vector<Outcome> out(all.size());
-  tbb::parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) { out[i] = outcome_of(all[i], twice); });
+  parallel_for(std::size_t{0}, all.size(), [&](std::size_t i) { out[i] = outcome_of(all[i], twice); });
   return out;
 }
 
@@ -211,8 +211,8 @@ void add_detection(Rows& rows, double rate_hz, const std::vector<SampleMotion>& 
 
 double largest_change(const std::vector<SampleMotion>& motions) {
   std::vector<double> moved(motions.size());
-  tbb::parallel_for(std::size_t{0}, motions.size(),
-                    [&](std::size_t i) { moved[i] = largest_move_cm(motions[i].clip, clean(motions[i].clip).clip); });
+  parallel_for(std::size_t{0}, motions.size(),
+               [&](std::size_t i) { moved[i] = largest_move_cm(motions[i].clip, clean(motions[i].clip).clip); });
   return std::ranges::max(moved);
 }
 

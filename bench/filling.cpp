@@ -10,10 +10,10 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/filling_measures.h"
 #include "bench/report.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/library/library_builder.h"
 #include "kinespace/motion/kinematics.h"
 #include "kinespace/motion/read.h"
@@ -36,7 +36,7 @@ Split load_split(const std::filesystem::path& folder) {
   Split out{.name = folder.filename().string(), .library = {}, .held_out = {}};
   const auto files = find_motion_files({folder});
   std::vector<Clip> clips(files.size());
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = read_clip(files[i]); });
+  parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = read_clip(files[i]); });
   for (std::size_t i = 0; i < clips.size(); ++i) {
     (i % held_out_every == held_out_every - 1 ? out.held_out : out.library).push_back(std::move(clips[i]));
   }

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for_each.h>
 
 #include "bench/report.h"
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/motion/amc.h"
 #include "kinespace/motion/bvh.h"
 #include "kinespace/motion/kinematics.h"
@@ -179,9 +179,7 @@ void measure_loss(const Corpus& corpus, std::vector<BenchResult>& results) {
   std::mutex mutex;
   double bvh = 0;
   double acclaim = 0;
-  std::vector<std::size_t> indices(corpus.paths.size());
-  for (std::size_t i = 0; i < indices.size(); ++i) indices[i] = i;
-  tbb::parallel_for_each(indices, [&](std::size_t i) {
+  parallel_for(std::size_t{0}, corpus.paths.size(), [&](std::size_t i) {
     const Clip clip = corpus.parse(i);
     const double by_bvh = largest_distance(clip, through_bvh(clip));
     const double by_acclaim = largest_distance(clip, through_acclaim(clip));

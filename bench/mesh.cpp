@@ -9,13 +9,13 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/mesh_measures.h"
 #include "bench/mesh_tables.h"
 #include "bench/plot.h"
 #include "bench/report.h"
 #include "bench/timing.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/mesh/mesh_files.h"
 
 namespace kinespace {
@@ -134,8 +134,8 @@ class MeshBench {
   void spaces(const std::string& name, const MeshSequence& mesh) {
     constexpr std::array projected{100, 200, 400};
     std::array<ProjectionError, projected.size()> errors;
-    tbb::parallel_for(std::size_t{0}, errors.size(),
-                      [&](std::size_t i) { errors[i] = projection_error(mesh, projected[i]); });
+    parallel_for(std::size_t{0}, errors.size(),
+                 [&](std::size_t i) { errors[i] = projection_error(mesh, projected[i]); });
     for (std::size_t i = 0; i < errors.size(); ++i) {
       spaces_.rows.push_back({name, static_cast<double>(projected[i]), errors[i].smooth, errors[i].harmonics,
                               errors[i].smooth / errors[i].harmonics});
@@ -143,7 +143,7 @@ class MeshBench {
     constexpr double kg = 0.5;
     constexpr std::array coded{400, 600};
     std::array<double, coded.size()> smooth{}, eigenvectors{};
-    tbb::parallel_for(std::size_t{0}, 2 * coded.size(), [&](std::size_t i) {
+    parallel_for(std::size_t{0}, 2 * coded.size(), [&](std::size_t i) {
       const bool of_eigenvectors = i % 2 == 1;
       (of_eigenvectors ? eigenvectors : smooth)[i / 2] = estimated_bpvf(mesh, kg, coded[i / 2], of_eigenvectors);
     });

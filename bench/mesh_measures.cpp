@@ -10,9 +10,9 @@
 
 #include <malloc.h>
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/timing.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/mesh/harmonics.h"
 #include "kinespace/mesh/mesh_error.h"
 #include "kinespace/mesh/projection.h"
@@ -32,7 +32,7 @@ double least_of_three(const std::function<void()>& work) {
 
 double projected_kg(const MeshSequence& mesh, const std::vector<RigidMotion>& motions, const Projection& space) {
   std::vector<double> missed(static_cast<std::size_t>(mesh.frames));
-  tbb::parallel_for(0, mesh.frames, [&](int f) {
+  parallel_for(0, mesh.frames, [&](int f) {
     const Points x = motions[static_cast<std::size_t>(f)].undo(frame_points(mesh, f));
     missed[static_cast<std::size_t>(f)] = (x - space.synthesise(space.coefficients(x))).squaredNorm();
   });

@@ -15,9 +15,9 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/report.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/library/library_builder.h"
 #include "kinespace/motion/read.h"
 #include "kinespace/synthesis/planted_player.h"
@@ -39,7 +39,7 @@ struct Played {
 Played load_played(const std::filesystem::path& folder) {
   const auto files = find_motion_files({folder});
   std::vector<PreparedClip> clips(files.size());
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = prepare(read_clip(files[i])); });
+  parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = prepare(read_clip(files[i])); });
   BuiltSpace built = build_space(source_of(clips), {});
   Played out{std::move(built.space), {}, {}, {}, {}};
   const auto basis = std::make_shared<const PlaybackBasis>(out.space);

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/report.h"
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/clip_space.h"
 #include "kinespace/fpca/pose_features.h"
 #include "kinespace/kernels/calibration.h"
@@ -36,7 +36,7 @@ Labelled load_labelled(const std::filesystem::path& folder) {
   const auto files = find_motion_files({folder});
   Labelled out;
   out.clips.resize(files.size());
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { out.clips[i] = prepare(read_clip(files[i])); });
+  parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { out.clips[i] = prepare(read_clip(files[i])); });
   for (const auto& file : files) {
     const std::string name = file.stem().string();
     const std::size_t first = name.find('_');
@@ -65,7 +65,7 @@ struct Accuracy {
 // percent.
 Accuracy accuracy(const Labelled& data, const std::function<std::size_t(std::size_t)>& nearest) {
   std::vector<std::size_t> answer(data.clips.size());
-  tbb::parallel_for(std::size_t{0}, answer.size(), [&](std::size_t i) { answer[i] = nearest(i); });
+  parallel_for(std::size_t{0}, answer.size(), [&](std::size_t i) { answer[i] = nearest(i); });
   Accuracy out;
   for (std::size_t i = 0; i < answer.size(); ++i) {
     if (answer[i] >= answer.size()) continue;
@@ -96,7 +96,7 @@ std::size_t nearest_vector(const Labelled& data, const Vectors& vectors, std::si
 Vectors resampled_vectors(const Labelled& data, const ClipSpace& space) {
   constexpr int points = 64;
   Vectors out(data.clips.size());
-  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
     SampleMatrix values = data.clips[i].curves.values;
     space.space().apply_references(values);
     const int last = static_cast<int>(values.rows()) - 1;
@@ -111,8 +111,8 @@ Vectors resampled_vectors(const Labelled& data, const ClipSpace& space) {
 
 FeatureSet keyframes_of(const Labelled& data) {
   std::vector<PoseFeatures> features(data.clips.size());
-  tbb::parallel_for(std::size_t{0}, features.size(),
-                    [&](std::size_t i) { features[i] = pose_features(data.clips[i].curves, data.clips[i].skeleton); });
+  parallel_for(std::size_t{0}, features.size(),
+               [&](std::size_t i) { features[i] = pose_features(data.clips[i].curves, data.clips[i].skeleton); });
   FeatureSet out{.dims = features.front().dims};
   for (const PoseFeatures& f : features) out.add(f.values);
   return out;
@@ -192,8 +192,8 @@ BenchReport bench_retrieval(const BenchOptions& options) {
   for (const PreparedClip& clip : data.clips) orientations.add(clip.curves.values);
   const ClipSpace space = ClipSpace::build(source_of(data.clips), orientations.references(), {}, compute);
   Vectors vectors(data.clips.size());
-  tbb::parallel_for(std::size_t{0}, vectors.size(),
-                    [&](std::size_t i) { vectors[i] = space.vector_of(data.clips[i].curves, compute); });
+  parallel_for(std::size_t{0}, vectors.size(),
+               [&](std::size_t i) { vectors[i] = space.vector_of(data.clips[i].curves, compute); });
   const Vectors plain = resampled_vectors(data, space);
   const std::vector<float> costs = all_costs(keyframes_of(data), compute);
 

@@ -4,9 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include <tbb/parallel_for.h>
-
 #include "bench/timing.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/registry.h"
 #include "kinespace/codecs/rma/rma_codec.h"
 #include "kinespace/codecs/stream/clip_error.h"
@@ -104,8 +103,8 @@ DecodedFigures judge_set(const CodedSet& set, const CodedFigures& coded) {
     const std::vector<Clip> decoded = open_stream(coded.streams[s], "bench")->decode_all();
     const auto seams = rma_seams(coded.streams[s], "bench");
     std::vector<ClipJudgement> parts(decoded.size());
-    tbb::parallel_for(std::size_t{0}, parts.size(),
-                      [&](std::size_t c) { parts[c] = judge(set.streams[s][c], decoded[c], seams[c]); });
+    parallel_for(std::size_t{0}, parts.size(),
+                 [&](std::size_t c) { parts[c] = judge(set.streams[s][c], decoded[c], seams[c]); });
     for (const ClipJudgement& part : parts) {
       out.slide_cm_s += part.slide;
       out.original_slide_cm_s += part.original;

@@ -11,9 +11,9 @@
 #include <vector>
 
 #include <nanoflann.hpp>
-#include <tbb/parallel_for.h>
 
 #include "bench/report.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/kernels/simd.h"
 #include "kinespace/library/library_builder.h"
 #include "kinespace/motion/read.h"
@@ -42,7 +42,7 @@ RowMatrix<float> all_vectors(const WindowSpace& space, const std::vector<WindowS
   std::vector<Eigen::Index> starts{0};
   for (const WindowSamples& s : stretches) starts.push_back(starts.back() + space.windows(s.rows()));
   RowMatrix<float> out(starts.back(), space.dimensions());
-  tbb::parallel_for(std::size_t{0}, stretches.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, stretches.size(), [&](std::size_t i) {
     out.middleRows(starts[i], starts[i + 1] - starts[i]) = space.vectors(stretches[i]);
   });
   return out;
@@ -51,7 +51,7 @@ RowMatrix<float> all_vectors(const WindowSpace& space, const std::vector<WindowS
 Windows load_windows(const std::filesystem::path& folder, const WindowOptions& options) {
   const auto files = find_motion_files({folder});
   std::vector<PreparedClip> clips(files.size());
-  tbb::parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = prepare(read_clip(files[i])); });
+  parallel_for(std::size_t{0}, files.size(), [&](std::size_t i) { clips[i] = prepare(read_clip(files[i])); });
   OrientationMoments orientations(curve_layout(clips.front().skeleton).joint_count());
   std::vector<WindowSamples> searched;
   std::vector<WindowSamples> held;
@@ -144,7 +144,7 @@ double time_queries(int rounds, const std::function<void(int)>& query) {
 
 int different_lists(const Windows& windows, const VectorSearch& search) {
   std::vector<int> different(queries, 0);
-  tbb::parallel_for(0, queries, [&](int q) {
+  parallel_for(0, queries, [&](int q) {
     const auto found = search.nearest(query_of(windows, q), neighbours);
     const auto wanted = reference::nearest(windows.searched, query_of(windows, q), neighbours);
     different[static_cast<std::size_t>(q)] = found == wanted ? 0 : 1;

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/prepared_set.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/level_errors.h"
 #include "kinespace/fpca/space_builder.h"
 #include "kinespace/motion/kinematics.h"
@@ -83,8 +83,8 @@ struct Figures {
 
 Figures measure(const PreparedSet& data, const RegisteredSpace& space, const std::vector<EncodedClip>& encoded, int n) {
   std::vector<ClipFigures> parts(data.clips.size());
-  tbb::parallel_for(std::size_t{0}, parts.size(),
-                    [&](std::size_t i) { parts[i] = measure(space, data.clips[i], encoded[i], n); });
+  parallel_for(std::size_t{0}, parts.size(),
+               [&](std::size_t i) { parts[i] = measure(space, data.clips[i], encoded[i], n); });
   Figures out;
   double sum = 0;
   double count = 0;
@@ -115,7 +115,7 @@ Figures measure(const PreparedSet& data, const RegisteredSpace& space, const std
 std::vector<EncodedClip> encode_with_detail(const PreparedSet& data, const BuiltSpace& built) {
   std::vector<EncodedClip> out = encode_all(data, built);
   const ClipDecoder decoder(built.space);
-  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
     ClipCurves curves = data.prepared[i].curves;
     built.space.apply_references(curves.values);
     measure_levels(decoder, curves, data.prepared[i].skeleton, built.space.levels(), out[i]);

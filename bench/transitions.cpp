@@ -7,7 +7,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
 #include "bench/bench_library.h"
@@ -19,6 +18,7 @@
 #include "kinespace/synthesis/transition_plan.h"
 #if KINESPACE_ALGLIB
 #include "kinespace/alglib/minimum.h"
+#include "kinespace/base/parallel.h"
 #endif
 
 namespace kinespace {
@@ -131,7 +131,7 @@ void connection_rows(const std::string& data, LibraryView& view, BenchReport& re
   const Refined ours = refine_pairs(motions, ends, pairs, minimise_in_box);
   const auto& found = ours.found;
   std::vector<std::optional<Connection>> wanted(pairs.size());
-  tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t i) {
     wanted[i] = reference::connect(space, ends.ends[pairs[i].first], ends.starts[pairs[i].second], 49, 160);
   });
   int agreeing = 0;

@@ -2,11 +2,11 @@
 #include <array>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/curve_errors.h"
 #include "bench/yoo2019_paper.h"
 #include "bench/yoo2019_tables.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/motion/error_measures.h"
 
 namespace kinespace {
@@ -42,7 +42,7 @@ SpaceFigures measure_space(const PreparedSet& set, const BuiltSpace& built) {
   const std::vector<EncodedClip> encoded = encode_all(set, built);
   std::vector<CurveErrors> errors(encoded.size());
   std::vector<double> joint_errors(encoded.size());
-  tbb::parallel_for(std::size_t{0}, encoded.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, encoded.size(), [&](std::size_t i) {
     errors[i] = sequence_errors(built, static_cast<int>(i), set.prepared[i], encoded[i]);
     const Clip decoded = clip_from_curves(decode(built.space, encoded[i]), set.clips[i].skeleton);
     joint_errors[i] = compare(set.clips[i], decoded).mean_joint_error_cm * encoded[i].frames;

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "bench/plot.h"
 #include "bench/yoo2019_paper.h"
 #include "bench/yoo2019_tables.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/stream/clip_error.h"
 #include "kinespace/fpca/analytic_basis.h"
 #include "kinespace/motion/error_measures.h"
@@ -72,7 +72,7 @@ struct ClipVector {
 
 std::vector<ClipVector> measure_vectors(const PreparedSet& set, const VectorSpace& space) {
   std::vector<ClipVector> out(set.clips.size());
-  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) {
     const EncodedClip part = stored_part(space.encoded[i], table_functions, table_threshold);
     const Clip decoded = clip_from_curves(decode(space.built.space, part, table_functions), set.clips[i].skeleton);
     out[i] = {set.clips[i].name, raw_bytes(set.clips[i]) / (4 * std::max(1.0, stored_numbers(part))),
@@ -146,7 +146,7 @@ ErrorsLeft errors_left(const PreparedSet& set, const VectorSpace& space) {
   const CurveMatrix ours = group.functions.transpose();
   const std::array<CurveMatrix, 2> analytic{fourier.functions().transpose(), legendre.functions().transpose()};
   std::vector<ErrorsLeft> parts(set.prepared.size());
-  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) {
     const PreparedClip& clip = set.prepared[i];
     SampleMatrix values = clip.curves.values;
     plain.apply_references(values);

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/storage/bitstream.h"
 
 namespace kinespace {
@@ -29,8 +29,8 @@ SampleMatrix clip_samples(const MotionSpace& space, const ClipCurves& curves) {
 
 std::vector<SampleMatrix> block_samples(const PreparedSource& clips, const MotionSpace& space, int start, int count) {
   std::vector<SampleMatrix> out(static_cast<std::size_t>(count));
-  tbb::parallel_for(
-      0, count, [&](int i) { out[static_cast<std::size_t>(i)] = clip_samples(space, clips.load(start + i).curves); });
+  parallel_for(0, count,
+               [&](int i) { out[static_cast<std::size_t>(i)] = clip_samples(space, clips.load(start + i).curves); });
   return out;
 }
 
@@ -108,7 +108,7 @@ std::vector<float> ClipSpace::vector_of(const ClipCurves& curves, const Compute&
 std::vector<std::vector<float>> ClipSpace::vectors_of(std::span<const ClipCurves* const> clips,
                                                       const Compute& compute) const {
   std::vector<SampleMatrix> samples(clips.size());
-  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, clips.size(), [&](std::size_t i) {
     samples[i] = clip_samples(space_, *clips[i]);
     samples[i].leftCols<3>() *= travel_scale_;
   });

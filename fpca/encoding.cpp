@@ -6,9 +6,8 @@
 #include <limits>
 #include <utility>
 
-#include <tbb/parallel_for.h>
-
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/cut_join.h"
 #include "kinespace/fpca/left_out.h"
 #include "kinespace/fpca/registration.h"
@@ -256,7 +255,7 @@ std::vector<EncodedClip> encode(const RegisteredSpace& space, std::span<const Cl
   using OfClip = std::vector<std::pair<int, SampleMatrix>>;
   std::vector<EncodedClip> out(clips.size());
   std::vector<OfClip> samples(clips.size());
-  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, clips.size(), [&](std::size_t i) {
     out[i] = encode_with(space, *clips[i].curves, clips[i].runs, clips[i].warps,
                          [&](int cycles, SampleMatrix&& of) { samples[i].emplace_back(cycles, std::move(of)); });
   });
@@ -268,8 +267,7 @@ std::vector<EncodedClip> encode(const RegisteredSpace& space, std::span<const Cl
   std::vector<ScoreMatrix> scores = queue.finish();
   std::size_t next = 0;
   for (EncodedClip& clip : out) take_scores(clip, scores, next);
-  tbb::parallel_for(std::size_t{0}, out.size(),
-                    [&](std::size_t i) { complete_scores(space, *clips[i].curves, out[i]); });
+  parallel_for(std::size_t{0}, out.size(), [&](std::size_t i) { complete_scores(space, *clips[i].curves, out[i]); });
   return out;
 }
 

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/conditional_scores.h"
 #include "kinespace/kernels/covariance.h"
 #include "kinespace/kernels/projection.h"
@@ -259,8 +259,8 @@ std::vector<ScoreMatrix> MotionSpace::scores(std::span<const SampleMatrix> sampl
     return scores_on_device(samples, compute);
   }
   std::vector<ScoreMatrix> out(samples.size());
-  tbb::parallel_for(std::size_t{0}, samples.size(),
-                    [&](std::size_t i) { out[i] = scores_by(ScoreKind::conditional, samples[i]); });
+  parallel_for(std::size_t{0}, samples.size(),
+               [&](std::size_t i) { out[i] = scores_by(ScoreKind::conditional, samples[i]); });
   return out;
 }
 

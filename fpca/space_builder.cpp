@@ -8,11 +8,10 @@
 
 #include <Eigen/Eigenvalues>
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/pose_features.h"
 
 namespace kinespace {
@@ -33,7 +32,7 @@ void for_each_clip(const PreparedSource& clips, const Progress& progress, std::s
     progress.at(stage, static_cast<double>(start) / clips.count);
     const int count = std::min(clips_per_sum, clips.count - start);
     std::vector<std::optional<Result>> results(static_cast<std::size_t>(count));
-    tbb::parallel_for(0, count, [&](int i) {
+    parallel_for(0, count, [&](int i) {
       PreparedClip clip = clips.load(start + i);
       results[static_cast<std::size_t>(i)] = work(start + i, clip);
     });

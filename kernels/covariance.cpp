@@ -8,9 +8,9 @@
 #include <vector>
 
 #include <cblas.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/kernels/blas_call.h"
 #include "kinespace/kernels/detail/covariance.h"
 #include "kinespace/kernels/simd.h"
@@ -96,7 +96,7 @@ void add_on_processor(const float* curves, Eigen::Index stride, Eigen::Index cou
   std::vector<Block<T>> wave(std::min(kWave, blocks));
   for (std::size_t first = 0; first < blocks; first += kWave) {
     const std::size_t in_wave = std::min(kWave, blocks - first);
-    tbb::parallel_for(std::size_t{0}, in_wave, [&](std::size_t b) {
+    parallel_for(std::size_t{0}, in_wave, [&](std::size_t b) {
       const auto at = static_cast<Eigen::Index>(first + b) * kBlockCurves;
       wave[b].compute(curves + at * stride, stride, std::min(kBlockCurves, count - at), moments.shift);
     });

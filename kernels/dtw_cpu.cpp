@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
-#include <oneapi/tbb/parallel_for.h>
 
+#include "kinespace/base/parallel.h"
 #include "kinespace/kernels/detail/dtw.h"
 #include "kinespace/kernels/simd.h"
 
@@ -156,7 +156,7 @@ class PairMatcher {
 void dtw_cpu(const FeatureSet& queries, const FeatureSet& targets, std::span<const ClipPair> pairs,
              const DtwOptions& options, std::span<DtwMatch> matches) {
   tbb::enumerable_thread_specific<PairMatcher> matchers;
-  tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t p) {
+  parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t p) {
     matches[p] =
         matchers.local().match(queries.clip(pairs[p].query), targets.clip(pairs[p].target), queries.dims, options);
   });

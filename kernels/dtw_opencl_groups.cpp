@@ -1,6 +1,6 @@
 // The host side of dtw_groups.cl: one work-group a pair.
-#include <oneapi/tbb/parallel_for.h>
 
+#include "kinespace/base/parallel.h"
 #include "kinespace/kernels/detail/dtw_opencl.h"
 
 namespace kinespace::dtw_detail {
@@ -49,7 +49,7 @@ void run(DeviceTask& task, cl::Kernel& kernel, std::span<const DevicePair> pairs
 
   auto* steps = static_cast<cl_uint*>(
       task.queue.enqueueMapBuffer(step_buffer, CL_TRUE, CL_MAP_READ, 0, step_words * sizeof(cl_uint)));
-  tbb::parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t p) {
+  parallel_for(std::size_t{0}, pairs.size(), [&](std::size_t p) {
     auto& match = matches[pairs[p].match];
     if (!match.found()) return;
     const cl_uint* own = steps + jobs[p].steps;

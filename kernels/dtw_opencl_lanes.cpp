@@ -1,8 +1,7 @@
 // The host side of dtw_lanes.cl: pairs with the same query, sixteen targets of similar lengths at a time.
 #include <array>
 
-#include <oneapi/tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/kernels/detail/dtw_opencl.h"
 
 namespace kinespace::dtw_detail {
@@ -182,7 +181,7 @@ class LaneRunner {
     const auto bytes = step_vectors_ * kVectorBytes;
     const auto* steps =
         static_cast<const std::uint32_t*>(task_.queue.enqueueMapBuffer(steps_, CL_TRUE, CL_MAP_READ, 0, bytes));
-    tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t g) {
+    parallel_for(std::size_t{0}, batch.size(), [&](std::size_t g) {
       const std::uint32_t* own = steps + jobs_[g].steps * kLanes;
       for (std::size_t lane = 0; lane < batch[g].pairs.size(); ++lane) trace_lane(batch[g], own + lane, lane);
     });
@@ -218,7 +217,7 @@ class LaneRunner {
 
 void match_in_lanes(DeviceTask& task, std::span<DtwMatch> matches, std::vector<std::size_t>& left_over) {
   auto groups = gather(task);
-  tbb::parallel_for(std::size_t{0}, groups.size(), [&](std::size_t g) { measure(task, groups[g]); });
+  parallel_for(std::size_t{0}, groups.size(), [&](std::size_t g) { measure(task, groups[g]); });
   const auto most_steps =
       task.options.want_path ? task.step_bytes() / kVectorBytes : std::numeric_limits<std::uint64_t>::max();
   const auto most_scratch = task.scratch_bytes() / kVectorBytes;

@@ -5,9 +5,9 @@
 #include <string>
 
 #include <cblas.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/kernels/blas_call.h"
 #include "kinespace/kernels/detail/keyframe_distance.h"
 
@@ -53,7 +53,7 @@ RowMatrix<float> on_processor(const Factors& factors, DistanceKind kind) {
   use_single_threaded_blas();
   RowMatrix<float> out(factors.a.rows(), factors.b.rows());
   const Eigen::Index blocks = (out.rows() + kBlockRows - 1) / kBlockRows;
-  tbb::parallel_for(Eigen::Index{0}, blocks, [&](Eigen::Index block) {
+  parallel_for(Eigen::Index{0}, blocks, [&](Eigen::Index block) {
     const Eigen::Index first = block * kBlockRows;
     distances_of_rows(factors, first, std::min(kBlockRows, out.rows() - first), kind, out);
   });

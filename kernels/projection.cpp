@@ -5,9 +5,9 @@
 #include <type_traits>
 
 #include <cblas.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/kernels/blas_call.h"
 #include "kinespace/kernels/detail/projection.h"
 
@@ -47,7 +47,7 @@ void gemm(Eigen::Index n, Eigen::Index m, Eigen::Index k, const T* a, Eigen::Ind
 template <typename Body>
 void for_row_blocks(Eigen::Index rows, const Body& body) {
   use_single_threaded_blas();
-  tbb::parallel_for(Eigen::Index{0}, (rows + kProjectionRows - 1) / kProjectionRows, [&](Eigen::Index block) {
+  parallel_for(Eigen::Index{0}, (rows + kProjectionRows - 1) / kProjectionRows, [&](Eigen::Index block) {
     const Eigen::Index first = block * kProjectionRows;
     body(first, std::min(kProjectionRows, rows - first));
   });

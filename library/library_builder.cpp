@@ -7,10 +7,10 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/level_errors.h"
 #include "kinespace/library/detail/space_codec.h"
 #include "kinespace/library/library_view.h"
@@ -84,7 +84,7 @@ int import_files(std::vector<Import>& imports, const LibraryBuilderOptions& opti
     progress.check_stop();
     progress.at("import", static_cast<double>(start) / count);
     const int in_block = std::min(clips_per_block, count - start);
-    tbb::parallel_for(0, in_block, [&](int i) {
+    parallel_for(0, in_block, [&](int i) {
       Import& import = imports[static_cast<std::size_t>(start + i)];
       const bool was_there = import_file(import, options, build);
       known[static_cast<std::size_t>(start + i)] = was_there && from_before.contains(import.source_hash) ? 1 : 0;
@@ -179,7 +179,7 @@ class SpaceWriter {
     constexpr int ordinary_frames = 4096;
     std::vector<Ready> out(static_cast<std::size_t>(count));
     std::vector<std::optional<PreparedClip>> held(out.size());
-    tbb::parallel_for(0, count, [&](int i) {
+    parallel_for(0, count, [&](int i) {
       const auto at = static_cast<std::size_t>(i);
       PreparedClip clip = source.load(start + i);
       built_.space.apply_references(clip.curves.values);
@@ -193,7 +193,7 @@ class SpaceWriter {
       complete(std::move(clip), out[at]);
     });
     encode_together(start, held, out);
-    tbb::parallel_for(std::size_t{0}, held.size(), [&](std::size_t at) {
+    parallel_for(std::size_t{0}, held.size(), [&](std::size_t at) {
       if (held[at]) complete(*std::move(held[at]), out[at]);
     });
     return out;

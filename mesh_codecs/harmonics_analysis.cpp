@@ -4,8 +4,8 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
+#include "kinespace/base/parallel.h"
 #include "kinespace/mesh/rigid.h"
 #include "kinespace/mesh_codecs/detail/measured_mesh.h"
 
@@ -34,7 +34,7 @@ void HarmonicsAnalysis::align() {
   track_ = quantised(rigid_motions(coded(), settings_.key), setup_.size);
   track_bytes_ = pack_track(track_);
   aligned_.resize(static_cast<std::size_t>(mesh_.frames));
-  tbb::parallel_for(0, mesh_.frames, [&](int f) {
+  parallel_for(0, mesh_.frames, [&](int f) {
     const auto at = static_cast<std::size_t>(f);
     aligned_[at] = track_.motion(at).undo(frame_points(coded(), f));
   });
@@ -66,7 +66,7 @@ void HarmonicsAnalysis::find_coefficients() {
   for (int b = 0; b < split_.count(); ++b) {
     BlockTables& block = blocks_.emplace_back();
     block.coefficients.resize(3 * std::int64_t{space_->functions()}, split_.size(b));
-    tbb::parallel_for(0, split_.size(b), [&](int at) {
+    parallel_for(0, split_.size(b), [&](int at) {
       const Points& x = aligned_[static_cast<std::size_t>(split_.first(b) + at)];
       const Coefficients c = space_->coefficients(x, settings_.rotate) - space_->key_coefficients();
       for (int k = 0; k < space_->functions(); ++k) {
@@ -90,7 +90,7 @@ Coefficients HarmonicsAnalysis::true_coefficients(const BlockTables& block, int 
 template <typename Which>
 Eigen::MatrixXd HarmonicsAnalysis::residual_table(int block, const Which& coefficients) const {
   Eigen::MatrixXd out(3 * std::int64_t{space_->vertices()}, split_.size(block));
-  tbb::parallel_for(0, split_.size(block), [&](int at) {
+  parallel_for(0, split_.size(block), [&](int at) {
     space_->residual(aligned_[static_cast<std::size_t>(split_.first(block) + at)], coefficients(at), settings_.rotate,
                      std::span(out.col(at).data(), static_cast<std::size_t>(out.rows())));
   });
@@ -134,7 +134,7 @@ HarmonicsAnalysis::Trial HarmonicsAnalysis::encode(double step) const {
   HarmonicsFrames frames(space_, refinement_, settings_.rotate);
   frames.track = track_;
   Trial out{.attempt = code(step, true, &frames), .decoded = mesh_, .kg = 0};
-  tbb::parallel_for(0, mesh_.frames, [&](int f) { set_frame(out.decoded, f, frames.frame(f)); });
+  parallel_for(0, mesh_.frames, [&](int f) { set_frame(out.decoded, f, frames.frame(f)); });
   out.kg = compare_positions(mesh_, out.decoded).kg;
   return out;
 }

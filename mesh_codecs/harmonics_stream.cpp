@@ -5,9 +5,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/entropy/integer_coder.h"
 
 namespace kinespace {
@@ -119,7 +119,7 @@ void HarmonicsFrames::add_block(const MovingPart& motion, MovingPart detail) {
   const auto components = static_cast<std::size_t>(motion.functions.cols());
   MovingPart low{.functions = motion.functions, .weights = {}, .nodes = space_->vertices()};
   low.weights.resize(components * vertices * 3);
-  tbb::parallel_for(std::size_t{0}, components, [&](std::size_t r) {
+  parallel_for(std::size_t{0}, components, [&](std::size_t r) {
     Coefficients c(motion.nodes, 3);
     const float* const row = motion.weights.data() + r * static_cast<std::size_t>(motion.nodes) * 3;
     for (int k = 0; k < motion.nodes; ++k) {

@@ -5,10 +5,9 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/mesh_codecs/detail/draco_frames.h"
 #include "kinespace/mesh_codecs/detail/paper_harmonics.h"
 #include "kinespace/mesh_codecs/detail/trajectory_pca.h"
@@ -92,7 +91,7 @@ MeshSequence MeshStreamReader::decode(int first, int count, const Progress& prog
   for (int from = 0; from < count; from += together) {
     progress.check_stop();
     progress.at("frames", static_cast<double>(from) / count);
-    tbb::parallel_for(from, std::min(from + together, count), [&](int f) { set_frame(out, f, frame(first + f)); });
+    parallel_for(from, std::min(from + together, count), [&](int f) { set_frame(out, f, frame(first + f)); });
   }
   return out;
 }

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 
-#include <tbb/parallel_for.h>
-
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/frame_moments.h"
 
 namespace kinespace {
@@ -45,7 +44,7 @@ Eigen::MatrixXf GroupSpace::project(const FrameTable& table, std::span<const Fra
   Eigen::MatrixXf out(axes.cols(), frames);
   const Eigen::MatrixXf turned = axes.transpose().cast<float>();
   const Eigen::VectorXf origin = mean.cast<float>();
-  tbb::parallel_for(std::size_t{0}, ranges.size(), [&](std::size_t r) {
+  parallel_for(std::size_t{0}, ranges.size(), [&](std::size_t r) {
     const Eigen::MatrixXf centred = frame_matrix(table, ranges[r]).colwise() - origin;
     out.middleCols(column[r], ranges[r].frames()).noalias() = turned * centred;
   });

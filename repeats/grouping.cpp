@@ -4,8 +4,8 @@
 #include <limits>
 
 #include <Eigen/Core>
-#include <tbb/parallel_for.h>
 
+#include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/behaviour_groups.h"
 #include "kinespace/repeats/detail/frame_moments.h"
 #include "kinespace/repeats/detail/normalised_cut.h"
@@ -48,11 +48,11 @@ float affinity(const Signature& a, const Signature& b, float alpha) {
 Eigen::MatrixXf affinities(std::span<const FrameMoments> moments, const Eigen::VectorXd& origin,
                            const GroupingOptions& options) {
   std::vector<Signature> signatures(moments.size());
-  tbb::parallel_for(std::size_t{0}, moments.size(),
-                    [&](std::size_t s) { signatures[s] = signature_of(moments[s], origin, options); });
+  parallel_for(std::size_t{0}, moments.size(),
+               [&](std::size_t s) { signatures[s] = signature_of(moments[s], origin, options); });
   const auto count = static_cast<Eigen::Index>(moments.size());
   Eigen::MatrixXf out(count, count);
-  tbb::parallel_for(Eigen::Index{0}, count, [&](Eigen::Index c) {
+  parallel_for(Eigen::Index{0}, count, [&](Eigen::Index c) {
     for (Eigen::Index r = 0; r < count; ++r) {
       out(r, c) = affinity(signatures[static_cast<std::size_t>(r)], signatures[static_cast<std::size_t>(c)],
                            static_cast<float>(options.alpha));
@@ -111,8 +111,8 @@ SegmentGrouping group_segments(const FrameTable& table, std::span<const FrameSpa
 
   const FrameTable reduced = reduced_table(table, working_dimensions);
   std::vector<FrameMoments> moments(segments.size());
-  tbb::parallel_for(std::size_t{0}, segments.size(),
-                    [&](std::size_t s) { moments[s] = frame_moments(reduced, segments.subspan(s, 1)); });
+  parallel_for(std::size_t{0}, segments.size(),
+               [&](std::size_t s) { moments[s] = frame_moments(reduced, segments.subspan(s, 1)); });
   const FrameSpan all{0, reduced.frames};
   const FrameMoments total = frame_moments(reduced, std::span(&all, 1));
   const Eigen::MatrixXd embedding = normalised_cut_embedding(affinities(moments, total.mean, options), most);
@@ -121,7 +121,7 @@ SegmentGrouping group_segments(const FrameTable& table, std::span<const FrameSpa
                                    (1 - options.variance) * total.covariance.trace(), options);
   std::vector<std::vector<int>> tried(static_cast<std::size_t>(most));
   std::vector<double> cost(tried.size());
-  tbb::parallel_for(std::size_t{0}, tried.size(), [&](std::size_t k) {
+  parallel_for(std::size_t{0}, tried.size(), [&](std::size_t k) {
     tried[k] = cluster_rows(embedding.leftCols(static_cast<Eigen::Index>(k) + 1), static_cast<int>(k) + 1);
     behaviours.refine(tried[k]);
     cost[k] = behaviours.cost(tried[k]);

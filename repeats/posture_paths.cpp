@@ -8,6 +8,7 @@
 
 #include <tbb/parallel_sort.h>
 
+#include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/option_range.h"
 #include "kinespace/repeats/detail/path_bridges.h"
 #include "kinespace/repeats/detail/table_minima.h"
@@ -62,6 +63,7 @@ class PathTracer {
       }
     }
     tbb::parallel_sort(out.begin(), out.end());
+    throw_if_cancelled();
     return out;
   }
 

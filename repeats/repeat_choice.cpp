@@ -8,8 +8,7 @@
 #include <tuple>
 #include <unordered_set>
 
-#include <tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/option_range.h"
 #include "kinespace/repeats/detail/path_index.h"
 #include "kinespace/repeats/detail/repeat_candidates.h"
@@ -81,8 +80,7 @@ class Chooser {
   std::vector<PrimaryChoice> choose(std::span<const PosturePath> paths) {
     const std::vector<PixelInterval> candidates = candidate_intervals(table_, paths, shortest_, longest_pixels());
     std::vector<double> gains(candidates.size());
-    tbb::parallel_for(std::size_t{0}, candidates.size(),
-                      [&](std::size_t c) { gains[c] = evaluate(candidates[c]).gain; });
+    parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t c) { gains[c] = evaluate(candidates[c]).gain; });
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       if (is_new(candidates[c])) push(candidates[c], gains[c]);
     }

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <numeric>
 
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
 
+#include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/option_range.h"
 #include "kinespace/repeats/detail/repeat_clips.h"
 #include "kinespace/repeats/detail/table_parts.h"
@@ -101,7 +101,7 @@ RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& opt
   out.grouping = group_segments(table, behaviour_segments(table, options.segmentation), options.grouping);
   progress.check_stop();
   out.spaces.resize(static_cast<std::size_t>(out.grouping.groups));
-  tbb::parallel_for(std::size_t{0}, out.spaces.size(), [&](std::size_t group) {
+  parallel_for(std::size_t{0}, out.spaces.size(), [&](std::size_t group) {
     const std::vector<FrameSpan> ranges = out.grouping.ranges(static_cast<int>(group), table);
     out.spaces[group] = fit_group_space(table, ranges, {.variance = options.variance});
   });
@@ -128,6 +128,7 @@ RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& opt
   };
   tbb::parallel_pipeline(tables_at_once, tbb::make_filter<void, Work*>(tbb::filter_mode::serial_in_order, draw) &
                                              tbb::make_filter<Work*, void>(tbb::filter_mode::parallel, choose));
+  throw_if_cancelled();
   out.clips = merged(work);
   return out;
 }

@@ -7,8 +7,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
-#include <tbb/parallel_for.h>
 
+#include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/frame_moments.h"
 #include "kinespace/repeats/detail/option_range.h"
 
@@ -165,7 +165,7 @@ std::vector<FrameSpan> behaviour_segments(const FrameTable& table, const Segment
   const auto apart = static_cast<std::int64_t>(std::llround(options.apart_s * table.rate_hz));
 
   std::vector<std::vector<FrameSpan>> parts(table.starts.size());
-  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, parts.size(), [&](std::size_t c) {
     const FrameSpan clip{table.starts[c], c + 1 < table.starts.size() ? table.starts[c + 1] : table.frames};
     std::vector<std::int64_t> cuts;
     add_clip_cuts(reduced, clip, pace, least_variance, options, cuts);

@@ -8,9 +8,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/alignment.h"
 #include "kinespace/synthesis/detail/connection_cost.h"
 #include "kinespace/synthesis/detail/connection_refinement.h"
@@ -397,7 +397,7 @@ ConnectionBounds::ConnectionBounds(const ConnectionOptions& options, std::span<c
 
   const auto tracks = [&](std::span<const ConnectionMotion* const> motions, std::vector<Track>& out) {
     out.resize(motions.size());
-    tbb::parallel_for(std::size_t{0}, motions.size(), [&](std::size_t i) {
+    parallel_for(std::size_t{0}, motions.size(), [&](std::size_t i) {
       const Eigen::MatrixXf poses = motions[i]->poses.rowwise() - centre;
       Track& track = out[i];
       track.length_s = motions[i]->length_s;

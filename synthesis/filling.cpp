@@ -6,9 +6,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/motion/curves.h"
 #include "kinespace/motion/kinematics.h"
 #include "kinespace/synthesis/detail/filling_core.h"
@@ -367,8 +367,8 @@ FillCalibration calibrate(const FillLibrary& library, const FillOptions& options
     const WindowShape shape{.before = side, .gap = gap, .after = side};
     const std::vector<Trial> trials = trials_of(library, shape, options.calibration_gaps);
     std::vector<std::vector<Miss>> parts(trials.size());
-    tbb::parallel_for(std::size_t{0}, trials.size(),
-                      [&](std::size_t i) { parts[i] = misses_of(library, options, shape, trials[i]); });
+    parallel_for(std::size_t{0}, trials.size(),
+                 [&](std::size_t i) { parts[i] = misses_of(library, options, shape, trials[i]); });
     progress.check_stop();
     progress.at("calibrate", static_cast<double>(l + 1) / lengths_s.size());
     std::vector<Miss> misses;

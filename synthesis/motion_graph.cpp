@@ -10,9 +10,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/alignment.h"
 #include "kinespace/synthesis/detail/graph_bridges.h"
 #include "kinespace/synthesis/detail/graph_ways.h"
@@ -31,7 +31,7 @@ void over_all(std::size_t count, const char* stage, const Progress& progress, co
   for (std::size_t begin = 0; begin < count; begin += clip_block) {
     progress.check_stop();
     progress.at(stage, static_cast<double>(begin) / static_cast<double>(count));
-    tbb::parallel_for(begin, std::min(begin + clip_block, count), work);
+    parallel_for(begin, std::min(begin + clip_block, count), work);
   }
   progress.at(stage, 1);
 }
@@ -42,7 +42,7 @@ std::vector<std::vector<std::size_t>> nearest_rows(const RetrievalMatrix& matrix
   const Eigen::Map<const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>> all(
       matrix.values.data(), count, static_cast<Eigen::Index>(matrix.dimensions));
   std::vector<std::vector<std::size_t>> out(matrix.clip_ids.size());
-  tbb::parallel_for(Eigen::Index{0}, count, [&](Eigen::Index i) {
+  parallel_for(Eigen::Index{0}, count, [&](Eigen::Index i) {
     const Eigen::VectorXf distance = (all.rowwise() - all.row(i)).rowwise().squaredNorm();
     std::vector<std::size_t> order(static_cast<std::size_t>(count));
     std::iota(order.begin(), order.end(), std::size_t{0});

@@ -5,9 +5,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/synthesis/detail/library_clips.h"
 
 namespace kinespace {
@@ -46,8 +46,8 @@ std::vector<SampledStretch> sample_clips(LibraryView& library, std::int64_t spac
     std::vector<EncodedClip> encoded;
     for (std::size_t i = 0; i < count; ++i) encoded.push_back(library.encoded(clips[start + i]));
     std::vector<std::vector<SampledStretch>> sampled(count);
-    tbb::parallel_for(std::size_t{0}, count,
-                      [&](std::size_t i) { sample_clip(space, encoded[i], start + i, options, sampled[i]); });
+    parallel_for(std::size_t{0}, count,
+                 [&](std::size_t i) { sample_clip(space, encoded[i], start + i, options, sampled[i]); });
     for (auto& stretches : sampled) std::ranges::move(stretches, std::back_inserter(out));
   }
   return out;
@@ -106,7 +106,7 @@ WindowIndex WindowIndex::build(LibraryView& library, std::int64_t space_id, cons
   WindowSpace space = WindowSpace::fit(samples, motions.skeleton(), motions.references(), options);
   progress.at("index", 0.7);
   RowMatrix<float> vectors(rows, space.dimensions());
-  tbb::parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, samples.size(), [&](std::size_t i) {
     const RowMatrix<float> part = space.vectors(samples[i]);
     vectors.middleRows(stretches[i].first_row, part.rows()) = part;
   });

@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/baselines/detail/packers.h"
 #include "kinespace/codecs/stream/clip_reader.h"
 #include "kinespace/codecs/stream/codec.h"
@@ -133,7 +133,7 @@ Bytes RawCodec::encode(std::span<const Clip> clips, const CodecOptions& options)
   const ClipTable table = clip_table_of(clips);
   const ChannelLayout layout = plain_layout(clips.front().skeleton);
   std::vector<Bytes> packed(clips.size());
-  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
     options.progress.check_stop();
     const ChannelCurves curves = channel_curves(clips[c], layout);
     require_channels_below(largest_channel_value, curves, clips[c].name);

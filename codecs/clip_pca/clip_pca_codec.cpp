@@ -5,9 +5,9 @@
 #include <cmath>
 
 #include <Eigen/QR>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/clip_pca/detail/clip_clusters.h"
 #include "kinespace/codecs/clip_pca/detail/clip_pca_stream.h"
 #include "kinespace/codecs/rma/contact_ik.h"
@@ -46,7 +46,7 @@ class ClipPcaEncoder {
     progress_.check_stop();
     contacts_.resize(clips_.size());
     if (!contacts) return;
-    tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { contacts_[c] = find_contacts(clips_[c]); });
+    parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { contacts_[c] = find_contacts(clips_[c]); });
   }
 
   // The share of variance that leaves the markers so many cm off, as root mean square.
@@ -73,7 +73,7 @@ class ClipPcaEncoder {
     for (const ClusterSpace& space : spaces_) add_group(space, share, stream);
     const ClipPcaDecoder decoder(table_, stream);
     std::vector<ClipErrorSums> parts(clips_.size());
-    tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+    parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
       progress_.check_stop();
       Clip decoded = decoder.decode_without_contacts(c);
       stream.contacts[c] = code_contacts(contacts_[c], decoded);
@@ -109,7 +109,7 @@ class ClipPcaEncoder {
       pieces += (clip.frames - 1) / length_ + 1;
     }
     rows_.resize(pieces, 4 * coordinates);
-    tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+    parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
       const int frames = clips_[c].frames;
       std::vector<double> markers(static_cast<std::size_t>(coordinates) * static_cast<std::size_t>(frames));
       clip_markers(aligned_, c, MarkerDecoder::alignment(roots_[c], root_span_), 0, clips_[c].frames, markers.data(),
@@ -140,7 +140,7 @@ class ClipPcaEncoder {
       }
     }
     Eigen::MatrixXd h(static_cast<Eigen::Index>(space.members.size()), axes);
-    tbb::parallel_for(std::size_t{0}, space.members.size(), [&](std::size_t i) {
+    parallel_for(std::size_t{0}, space.members.size(), [&](std::size_t i) {
       const Eigen::VectorXd off = rows_.row(space.members[i]).cast<double>().transpose() - space.mean;
       h.row(static_cast<Eigen::Index>(i)) = (space.axes.leftCols(axes).transpose() * off).transpose();
     });

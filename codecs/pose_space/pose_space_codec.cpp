@@ -6,10 +6,10 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/pose_space/detail/pose_space_encoder.h"
 #include "kinespace/codecs/pose_space/detail/pose_space_search.h"
 #include "kinespace/codecs/pose_space/pose_space_tables.h"
@@ -75,8 +75,8 @@ class PoseSpaceReader final : public ClipReader {
 
   [[nodiscard]] std::vector<Clip> decode_all(int level) const override {
     std::vector<Clip> out(clips().size());
-    tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t c) { out[c] = at_rest(c, 0, entry(c).frames); });
-    tbb::parallel_for(std::size_t{0}, layout_.groups.size(), [&](std::size_t g) {
+    parallel_for(std::size_t{0}, out.size(), [&](std::size_t c) { out[c] = at_rest(c, 0, entry(c).frames); });
+    parallel_for(std::size_t{0}, layout_.groups.size(), [&](std::size_t g) {
       const WindowGroup& group = layout_.groups[g];
       const GroupValues values = decode_values(g, level);
       for (std::size_t i = 0; i < group.count; ++i) {
@@ -107,6 +107,7 @@ class PoseSpaceReader final : public ClipReader {
         at_once, tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, draw) &
                      tbb::make_filter<std::size_t, std::vector<RunErrors>>(tbb::filter_mode::parallel, measure) &
                      tbb::make_filter<std::vector<RunErrors>, void>(tbb::filter_mode::serial_in_order, add));
+    throw_if_cancelled();
     ClipErrorSums out;
     for (const ClipErrorSums& clip : clips) out.add(clip);
     return out;

@@ -3,8 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include <tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/stream/natural_functions.h"
 #include "kinespace/motion/error_measures.h"
 
@@ -189,7 +188,7 @@ Eigen::MatrixXd solve_transposed(const Eigen::MatrixXd& lower, const Eigen::Matr
 
 Eigen::MatrixXd pose_moments(std::span<const PoseVectors> vectors, int dimensions) {
   std::vector<Eigen::MatrixXd> parts(vectors.size());
-  tbb::parallel_for(std::size_t{0}, vectors.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, vectors.size(), [&](std::size_t c) {
     parts[c] = Eigen::MatrixXd::Zero(dimensions, dimensions);
     parts[c].selfadjointView<Eigen::Lower>().rankUpdate(pose_curves(vectors[c], dimensions));
   });
@@ -210,7 +209,7 @@ PoseMetric mean_pose_metric(std::span<const Clip> clips, std::span<const PoseVec
   for (const PoseVectors& v : vectors) first.push_back(first.back() + v.frames);
   const std::int64_t samples = std::min(first.back(), most_samples);
   std::vector<PoseMetric> parts(static_cast<std::size_t>(samples));
-  tbb::parallel_for(std::int64_t{0}, samples, [&](std::int64_t s) {
+  parallel_for(std::int64_t{0}, samples, [&](std::int64_t s) {
     const std::int64_t frame = (2 * s + 1) * first.back() / (2 * samples);
     const auto c = static_cast<std::size_t>(std::ranges::upper_bound(first, frame) - first.begin()) - 1;
     const Eigen::VectorXd pose = pose_curves(vectors[c], d).col(frame - first[c]);

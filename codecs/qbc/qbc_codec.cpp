@@ -7,9 +7,9 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/qbc/detail/curve_choice.h"
 #include "kinespace/codecs/qbc/detail/pole_corrections.h"
 #include "kinespace/codecs/qbc/detail/qbc_stream.h"
@@ -69,7 +69,7 @@ class QbcEncoder {
         .interval = plan.interval, .step_index = step_index_of(plan), .root_unit = static_cast<float>(plan.root_unit)};
     std::vector<QbcCurve> coded(curves_.size());
     std::atomic<bool> all_kept = true;
-    tbb::parallel_for(std::size_t{0}, curves_.size(), [&](std::size_t i) {
+    parallel_for(std::size_t{0}, curves_.size(), [&](std::size_t i) {
       progress.check_stop();
       const auto [clip, joint] = curves_[i];
       const CurveTask wanted = task(clip, joint, plan, tables);

@@ -3,9 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/rma/contact_ik.h"
 #include "kinespace/codecs/rma/detail/seam_easing.h"
 #include "kinespace/codecs/rma/detail/spline_fit.h"
@@ -58,13 +57,13 @@ MarkerEncoder::MarkerEncoder(std::span<const Clip> clips, const Preparation& pre
   progress_.check_stop();
   split_clips();
   spaces_.resize(static_cast<std::size_t>(analysis_.grouping.groups));
-  tbb::parallel_for(std::size_t{0}, spaces_.size(), [&](std::size_t g) {
+  parallel_for(std::size_t{0}, spaces_.size(), [&](std::size_t g) {
     const auto ranges = analysis_.grouping.ranges(static_cast<int>(g), markers_);
     spaces_[g] = fit_group_space(markers_, ranges, {.axes = std::min(most_axes, markers_.dimensions)});
   });
   contacts_.resize(clips_.size());
   if (preparation.contacts) {
-    tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { contacts_[c] = find_contacts(clips_[c]); });
+    parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { contacts_[c] = find_contacts(clips_[c]); });
   }
   progress_.check_stop();
 }
@@ -72,7 +71,7 @@ MarkerEncoder::MarkerEncoder(std::span<const Clip> clips, const Preparation& pre
 std::vector<RootCode> fit_roots(const AlignedClips& clips, double tolerance_cm, int span) {
   constexpr double cm_per_radian = 20;  // how far a turn moves joints
   std::vector<RootCode> out(clips.vectors.size());
-  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, out.size(), [&](std::size_t c) {
     const RootAlignment exact = root_alignment(clips.vectors[c], clips.degrees[c]);
     RootCode& root = out[c];
     root.degrees = exact.degrees;
@@ -96,7 +95,7 @@ void MarkerEncoder::fill_markers() {
   }
   const auto d = static_cast<std::size_t>(markers_.dimensions);
   markers_.values.resize(d * static_cast<std::size_t>(markers_.frames));
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
     std::vector<double> markers(d * static_cast<std::size_t>(clips_[c].frames));
     clip_markers(aligned_, c, MarkerDecoder::alignment(roots_[c], root_span_), 0, clips_[c].frames, markers.data());
     std::ranges::transform(markers, markers_.values.begin() + static_cast<std::ptrdiff_t>(d) * markers_.starts[c],
@@ -185,7 +184,7 @@ void MarkerEncoder::code_clips(const MarkerSettings& settings, bool repeated, Ma
   const MarkerDecoder decoder(table_, stream, "the stream");
   const auto d = static_cast<Eigen::Index>(markers_.dimensions);
   std::vector<Curves> all(pieces_.size());
-  tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t c) {
     MarkerClip& clip = stream.clips[c];
     if (clip.repeats() != repeated) return;
     progress_.check_stop();
@@ -256,7 +255,7 @@ void MarkerEncoder::code_clips(const MarkerSettings& settings, bool repeated, Ma
     }
   }
   const int minimum_bits = repeated ? 6 : 8;
-  tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t c) {
     MarkerClip& clip = stream.clips[c];
     if (clip.repeats() != repeated) return;
     const std::vector<int> regular = regular_knots(clip.frames, stream.span);

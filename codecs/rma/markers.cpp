@@ -4,9 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/stream/clip_table.h"
 
 namespace kinespace {
@@ -185,7 +184,7 @@ AlignedClips align_clips(std::span<const Clip> clips) {
   out.reference = reference_pose(clips);
   out.vectors.resize(clips.size());
   out.degrees.resize(clips.size());
-  tbb::parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, clips.size(), [&](std::size_t c) {
     out.vectors[c] = pose_vectors(clips[c], out.reference);
     out.degrees[c] = alignment_degrees(out.vectors[c], out.reference);
   });
@@ -233,12 +232,12 @@ FrameTable marker_table(const AlignedClips& clips) {
   }
   const auto d = static_cast<std::size_t>(out.dimensions);
   out.values.resize(d * static_cast<std::size_t>(out.frames));
-  tbb::parallel_for(std::size_t{0}, clips.vectors.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, clips.vectors.size(), [&](std::size_t c) {
     // As doubles only some frames at a time.
     constexpr int block = 1024;
     const RootAlignment alignment = root_alignment(clips.vectors[c], clips.degrees[c]);
     const int blocks = (clips.vectors[c].frames + block - 1) / block;
-    tbb::parallel_for(0, blocks, [&](int b) {
+    parallel_for(0, blocks, [&](int b) {
       const int first = b * block;
       const int count = std::min(block, clips.vectors[c].frames - first);
       std::vector<double> markers(d * static_cast<std::size_t>(count));

@@ -1,9 +1,9 @@
 #include "kinespace/codecs/stream/clip_reader.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/stream/measured_stream.h"
 #include "kinespace/motion/curves.h"
 
@@ -44,7 +44,7 @@ Clip ClipReader::decode(std::size_t clip, int first, int count, int level) const
 
 std::vector<Clip> ClipReader::decode_all(int level) const {
   std::vector<Clip> out(table_.clips.size());
-  tbb::parallel_for(std::size_t{0}, out.size(), [&](std::size_t c) { out[c] = part(c, 0, entry(c).frames, level); });
+  parallel_for(std::size_t{0}, out.size(), [&](std::size_t c) { out[c] = part(c, 0, entry(c).frames, level); });
   return out;
 }
 

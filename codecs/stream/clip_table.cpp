@@ -6,9 +6,8 @@
 #include <cstring>
 #include <limits>
 
-#include <tbb/parallel_for.h>
-
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/entropy/integer_coder.h"
 #include "kinespace/motion/curves.h"
 
@@ -309,8 +308,8 @@ ClipTable clip_table_of(std::span<const Clip> clips) {
     entry.cut_evenly();
     out.clips.push_back(std::move(entry));
   }
-  tbb::parallel_for(std::size_t{0}, clips.size(),
-                    [&](std::size_t c) { out.clips[c].side_tracks = side_tracks_of(clips[c]); });
+  parallel_for(std::size_t{0}, clips.size(),
+               [&](std::size_t c) { out.clips[c].side_tracks = side_tracks_of(clips[c]); });
   return out;
 }
 

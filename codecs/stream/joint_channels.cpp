@@ -8,9 +8,9 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/stream/detail/joint_turns.h"
 #include "kinespace/entropy/range_coder.h"
 
@@ -511,7 +511,7 @@ ChannelLayout find_channel_layout(std::span<const Clip* const> clips, const Chan
   const std::vector<int> joints = clips.front()->skeleton.rotating_joints();
   ChannelLayout out;
   out.joints.resize(joints.size());
-  tbb::parallel_for(std::size_t{0}, joints.size(), [&](std::size_t j) {
+  parallel_for(std::size_t{0}, joints.size(), [&](std::size_t j) {
     std::vector<Quaterniond> turns;
     for (const Clip* clip : clips) append_turns(*clip, joints[j], turns);
     out.joints[j] = find_freedom(turns, search.tolerance_degrees, j == 0);

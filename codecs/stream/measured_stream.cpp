@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include <tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/stream/clip_error.h"
 #include "kinespace/storage/varint.h"
 
@@ -59,7 +58,7 @@ std::vector<std::span<const std::byte>> unpack_parts(std::span<const std::byte> 
 
 MeasuredError measured_error(std::span<const Clip> originals, const StreamReader& reader) {
   std::vector<ClipErrorSums> parts(originals.size());
-  tbb::parallel_for(std::size_t{0}, originals.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, originals.size(), [&](std::size_t c) {
     parts[c] = clip_error(originals[c], reader.decode(c), 0, originals[c].frames, 0);
   });
   ClipErrorSums out;

@@ -5,9 +5,9 @@
 #include <numbers>
 
 #include <Eigen/Eigenvalues>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/stream/natural_functions.h"
 #include "kinespace/motion/simd.h"
 
@@ -237,7 +237,7 @@ ReferencePose reference_pose(std::span<const Clip> clips) {
   const std::vector<int> joints = clips.front().skeleton.rotating_joints();
   ReferencePose out;
   out.steps.resize(joints.size());
-  tbb::parallel_for(std::size_t{0}, joints.size(), [&](std::size_t j) {
+  parallel_for(std::size_t{0}, joints.size(), [&](std::size_t j) {
     Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
     for (const Clip& clip : clips) {
       if (j == 0) {

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/mesh/connectivity.h"
 #include "kinespace/mesh_codecs/detail/measured_mesh.h"
 #include "kinespace/mesh_codecs/key_mesh.h"
@@ -57,8 +57,8 @@ Bytes stream_on(const MeshSequence& mesh, const std::vector<Triangle>& triangles
   for (int from = 0; from < mesh.frames; from += together) {
     progress.check_stop();
     progress.at("frames", static_cast<double>(from) / mesh.frames);
-    tbb::parallel_for(from, std::min(from + together, mesh.frames),
-                      [&](int f) { frames[static_cast<std::size_t>(f)] = packed_frame(mesh, triangles, grid, f); });
+    parallel_for(from, std::min(from + together, mesh.frames),
+                 [&](int f) { frames[static_cast<std::size_t>(f)] = packed_frame(mesh, triangles, grid, f); });
   }
   const MeshError error = measured(
       mesh, [&](int f) { return grid.points(grid.quantised(frame_points(mesh, f))); }, true, progress);

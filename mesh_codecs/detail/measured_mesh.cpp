@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
+
+#include "kinespace/base/parallel.h"
 
 namespace kinespace {
 
@@ -14,7 +15,7 @@ MeshError measured(const MeshSequence& mesh, const std::function<Points(int)>& f
   constexpr int together = 16;
   for (int from = 0; from < mesh.frames; from += together) {
     progress.check_stop();
-    tbb::parallel_for(from, std::min(from + together, mesh.frames), [&](int f) { set_frame(decoded, f, frame(f)); });
+    parallel_for(from, std::min(from + together, mesh.frames), [&](int f) { set_frame(decoded, f, frame(f)); });
   }
   return rigidity ? compare(mesh, decoded) : compare_positions(mesh, decoded);
 }

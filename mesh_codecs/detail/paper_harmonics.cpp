@@ -8,9 +8,9 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/mesh/connectivity.h"
 #include "kinespace/mesh/mesh_error.h"
 #include "kinespace/mesh_codecs/detail/linear_prediction.h"
@@ -126,7 +126,7 @@ class Encoder {
     progress_.check_stop();
     progress_.at("harmonics", 0);
     frames_.clusters.resize(keys.size());
-    tbb::parallel_for(std::size_t{0}, keys.size(), [&](std::size_t j) {
+    parallel_for(std::size_t{0}, keys.size(), [&](std::size_t j) {
       frames_.clusters[j] =
           std::make_shared<PaperCluster>(setup_.grid.points(mesh.keys[j]), mesh.triangles, setup_.functions);
     });
@@ -149,7 +149,7 @@ class Encoder {
       const PaperCluster& cluster = *frames_.clusters[j];
       const std::size_t width = cluster.key_row().size();
       std::vector<double>& table = tables_.emplace_back(members_[j].size() * width);
-      tbb::parallel_for(std::size_t{0}, members_[j].size(), [&](std::size_t i) {
+      parallel_for(std::size_t{0}, members_[j].size(), [&](std::size_t i) {
         const auto row = cluster.row_of(aligned(members_[j][i]));
         std::copy(row.begin(), row.end(), table.begin() + static_cast<std::ptrdiff_t>(i * width));
       });
@@ -162,7 +162,7 @@ class Encoder {
     constexpr int looked_at = 64;
     const int count = std::min(mesh_.frames, looked_at);
     std::vector<double> errors(static_cast<std::size_t>(count));
-    tbb::parallel_for(0, count, [&](int i) {
+    parallel_for(0, count, [&](int i) {
       const auto f = static_cast<int>(std::int64_t{mesh_.frames} * i / count);
       errors[static_cast<std::size_t>(i)] = (frames_.frame(f) - frame_points(mesh_, f)).squaredNorm();
     });

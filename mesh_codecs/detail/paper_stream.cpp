@@ -4,9 +4,9 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/entropy/integer_coder.h"
 #include "kinespace/mesh/harmonics.h"
 #include "kinespace/mesh_codecs/basis_cache.h"
@@ -163,7 +163,7 @@ class PaperReader final : public MeshStreamReader {
       }
     };
     if (cache == nullptr) {
-      tbb::parallel_for(std::size_t{0}, frames_.clusters.size(), make);
+      parallel_for(std::size_t{0}, frames_.clusters.size(), make);
     } else {
       for (std::size_t j = 0; j < frames_.clusters.size(); ++j) make(j);
     }

@@ -5,8 +5,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
+
+#include "kinespace/base/parallel.h"
 
 namespace kinespace {
 namespace {
@@ -79,6 +80,7 @@ FrameMoments frame_moments(const FrameTable& table, std::span<const FrameSpan> r
   SumBody body(table, blocks, origin);
   const std::size_t grain = std::max<std::size_t>(8, blocks.size() / 32);
   tbb::parallel_deterministic_reduce(tbb::blocked_range<std::size_t>(0, blocks.size(), grain), body);
+  throw_if_cancelled();
   const double n = static_cast<double>(out.count);
   const Eigen::VectorXd shift = body.sums().sum / n;
   out.mean = origin + shift;
@@ -111,7 +113,7 @@ FrameTable reduced_table(const FrameTable& table, int dimensions) {
   const Eigen::MatrixXf axes = principal.axes.leftCols(out.dimensions).transpose().cast<float>();
   const Eigen::VectorXf mean = moments.mean.cast<float>();
   const std::vector<FrameSpan> blocks = blocks_of(std::span(&all, 1));
-  tbb::parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
+  parallel_for(std::size_t{0}, blocks.size(), [&](std::size_t b) {
     const Eigen::MatrixXf centred = frame_matrix(table, blocks[b]).colwise() - mean;
     Eigen::Map<Eigen::MatrixXf>(out.values.data() + blocks[b].first * out.dimensions, out.dimensions,
                                 blocks[b].frames())

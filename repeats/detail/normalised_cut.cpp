@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include <Eigen/Eigenvalues>
-#include <tbb/parallel_for.h>
+
+#include "kinespace/base/parallel.h"
 
 namespace kinespace {
 namespace {
@@ -16,7 +17,7 @@ constexpr int means_rounds = 50;
 Eigen::VectorXd multiply(const Eigen::MatrixXf& w, const Eigen::VectorXd& x) {
   const Eigen::VectorXf xf = x.cast<float>();
   Eigen::VectorXd out(w.cols());
-  tbb::parallel_for(Eigen::Index{0}, w.cols(), [&](Eigen::Index c) { out(c) = static_cast<double>(w.col(c).dot(xf)); });
+  parallel_for(Eigen::Index{0}, w.cols(), [&](Eigen::Index c) { out(c) = static_cast<double>(w.col(c).dot(xf)); });
   return out;
 }
 

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <iterator>
 
-#include <tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/reference_warp.h"
 
 namespace kinespace {
@@ -63,7 +62,7 @@ ClipCollector::ClipCollector(const FrameTable& table, double shortest_s)
 
 void ClipCollector::add(const GroupTable& in, std::span<const PrimaryChoice> choices) {
   std::vector<std::vector<RepeatClip>> found(choices.size());
-  tbb::parallel_for(std::size_t{0}, choices.size(), [&](std::size_t c) { found[c] = clips_of(in, choices[c]); });
+  parallel_for(std::size_t{0}, choices.size(), [&](std::size_t c) { found[c] = clips_of(in, choices[c]); });
   std::vector<std::vector<RepeatClip>> held(static_cast<std::size_t>(in.distances.run_count()));
   for (std::size_t c = 0; c < choices.size(); ++c) {
     const int number = static_cast<int>(primaries_.size());

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/base/png.h"
 
 namespace kinespace {
@@ -29,7 +28,7 @@ TableImage::TableImage(const SelfDistance& table, int size)
   const auto pixel = [&](int at) {
     return std::min(table_size_ - 1, static_cast<int>((2 * std::int64_t{at} + 1) * table_size_ / (2 * size_)));
   };
-  tbb::parallel_for(0, size_, [&](int y) {
+  parallel_for(0, size_, [&](int y) {
     const int i = pixel(y);
     for (int x = 0; x < size_; ++x) {
       const int j = pixel(x);

@@ -6,7 +6,8 @@
 #include <cstring>
 
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
+
+#include "kinespace/base/parallel.h"
 
 namespace kinespace {
 namespace {
@@ -113,8 +114,8 @@ TableMinima find_minima(const SelfDistance& table, double threshold, std::int64_
   const MinimaFinder finder(table, threshold, lag);
   std::vector<Band> bands(static_cast<std::size_t>((table.size() + band_rows - 1) / band_rows));
   tbb::enumerable_thread_specific<Workspace> workspaces;
-  tbb::parallel_for(std::size_t{0}, bands.size(),
-                    [&](std::size_t b) { finder.find(static_cast<int>(b) * band_rows, workspaces.local(), bands[b]); });
+  parallel_for(std::size_t{0}, bands.size(),
+               [&](std::size_t b) { finder.find(static_cast<int>(b) * band_rows, workspaces.local(), bands[b]); });
   TableMinima out;
   out.row_begin.assign(1, 0);
   for (Band& band : bands) {

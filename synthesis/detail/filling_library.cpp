@@ -5,9 +5,9 @@
 #include <tuple>
 
 #include <Eigen/Eigenvalues>
-#include <tbb/parallel_for.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/alignment.h"
 
 namespace kinespace {
@@ -173,7 +173,7 @@ std::vector<FillWindow> FillLibrary::nearest(const FillTrack& query, const Windo
   features(query, 0, own);
 
   std::vector<std::vector<FillWindow>> found(all);
-  tbb::parallel_for(std::size_t{0}, all, [&](std::size_t i) {
+  parallel_for(std::size_t{0}, all, [&](std::size_t i) {
     if (static_cast<int>(i) == search.without) return;
     const bool of_library = i < tracks_.size();
     const FillTrack& t = of_library ? tracks_[i] : search.extra[i - tracks_.size()];

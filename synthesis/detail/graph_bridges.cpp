@@ -4,7 +4,7 @@
 #include <optional>
 #include <tuple>
 
-#include <tbb/parallel_for.h>
+#include "kinespace/base/parallel.h"
 
 namespace kinespace {
 namespace {
@@ -120,7 +120,7 @@ std::vector<GraphBridge> graph_bridges(const ConnectionSpace& space, std::span<c
       has_in[component[to]] = true;
     }
     std::vector<std::optional<GraphBridge>> found(2 * groups);
-    tbb::parallel_for(std::size_t{0}, 2 * groups, [&](std::size_t i) {
+    parallel_for(std::size_t{0}, 2 * groups, [&](std::size_t i) {
       const std::size_t group = i / 2;
       const bool leaving = i % 2 == 0;
       if (leaving ? has_out[group] : has_in[group]) return;

@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include <tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/baselines/channel_codec.h"
 #include "kinespace/codecs/baselines/detail/channel_metric.h"
 #include "kinespace/codecs/stream/codec.h"
@@ -84,7 +83,7 @@ void ChannelEncoder::prepare(const ChannelSearch& search) {
   first_piece.push_back(places_.size());
   const int channels = tables_.layout.channel_count();
   pieces_.resize(places_.size());
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
     progress_.check_stop();
     const Clip& clip = clips_[c];
     const ChannelCurves curves = channel_curves(clip, tables_.layout);
@@ -103,8 +102,7 @@ void ChannelEncoder::prepare(const ChannelSearch& search) {
   });
   if (transform_.weighted()) weigh(pieces_);
   analyses_.resize(pieces_.size());
-  tbb::parallel_for(std::size_t{0}, pieces_.size(),
-                    [&](std::size_t p) { analyses_[p] = transform_.analyse(pieces_[p]); });
+  parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) { analyses_[p] = transform_.analyse(pieces_[p]); });
 }
 
 // Scales every channel by how far it moves the body, on the average over the clips.
@@ -133,7 +131,7 @@ void ChannelEncoder::code(Coded& coded, double rate_weight) const {
   const CoefficientTables& coding = coded.tables.coding;
   coded.pieces.resize(pieces_.size());
   std::vector<CodingStatistics> statistics(pieces_.size());
-  tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+  parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
     const PieceCoefficients& from = coded.coefficients[p];
     const PieceShape shape = coded_shape(from.shape, coding.spectrum);
     const auto used = static_cast<std::size_t>(shape.functions);
@@ -154,7 +152,7 @@ void ChannelEncoder::code(Coded& coded, double rate_weight) const {
 CodedAttempt ChannelEncoder::encode(const Quality& quality, double rate_weight) {
   Coded coded{.tables = tables_, .coefficients = {}, .pieces = {}, .statistics = {}};
   coded.coefficients.resize(pieces_.size());
-  tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+  parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
     progress_.check_stop();
     coded.coefficients[p] = analyses_[p]->at(quality);
   });

@@ -5,8 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include <tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/fpca/symmetric_eigen.h"
 
 namespace kinespace {
@@ -118,7 +117,7 @@ std::vector<ClusterSpace> cluster_spaces(const Eigen::MatrixXf& rows, double sha
     }
     std::erase_if(members, [](const std::vector<int>& m) { return m.empty(); });
     std::vector<ClusterSpace> spaces(members.size());
-    tbb::parallel_for(std::size_t{0}, members.size(), [&](std::size_t c) { spaces[c] = space_of(rows, members[c]); });
+    parallel_for(std::size_t{0}, members.size(), [&](std::size_t c) { spaces[c] = space_of(rows, members[c]); });
     const double cost = cost_of(spaces, share, rows.cols());
     if (cost >= least) break;
     least = cost;

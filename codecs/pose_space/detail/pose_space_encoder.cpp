@@ -5,9 +5,8 @@
 #include <map>
 #include <memory>
 
-#include <tbb/parallel_for.h>
-
 #include "kinespace/base/error.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/pose_space/time_blocks.h"
 #include "kinespace/codecs/stream/codec.h"
 #include "kinespace/codecs/stream/measured_stream.h"
@@ -56,7 +55,7 @@ PoseSpaceEncoder::PoseSpaceEncoder(std::span<const Clip> clips, const Progress& 
 
 void PoseSpaceEncoder::take_vectors() {
   progress_.check_stop();
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) {
     vectors_[c] = {};
     vectors_[c] = pose_vectors(clips_[c], reference_);
     table_.clips[c].placement = vectors_[c].placement;
@@ -67,7 +66,7 @@ void PoseSpaceEncoder::take_vectors() {
 void PoseSpaceEncoder::plan(double step, const PoseSpaceSettings& settings) {
   if (!windows_.empty()) take_vectors();  // the plan before made coefficients of them
   weigh(settings.shell_weight);
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { cut(c, step, settings); });
+  parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { cut(c, step, settings); });
   transform();
   measure_energies();
 }
@@ -98,12 +97,12 @@ void PoseSpaceEncoder::transform() {
   }
   std::vector<int> lengths;
   for (const auto& [points, none] : transforms) lengths.push_back(points);
-  tbb::parallel_for(std::size_t{0}, lengths.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, lengths.size(), [&](std::size_t i) {
     transforms.at(lengths[i]) = std::make_shared<const WindowTransform>(lengths[i], lengths[i]);
   });
 
   const int d = reference_.dimensions();
-  tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+  parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
     const Window& window = windows_[w];
     PoseVectors& vectors = vectors_[window.clip];
     double* const place = vectors.values.data() + window.first;
@@ -124,7 +123,7 @@ PoseSpaceEncoder::Coefficients PoseSpaceEncoder::coefficients(std::size_t w) con
 void PoseSpaceEncoder::measure_energies() {
   const RowMatrix root = Eigen::MatrixXd(metric_.llt().matrixU());
   energies_.resize(windows_.size());
-  tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+  parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
     const RowMatrix moved = root.triangularView<Eigen::Upper>() * coefficients(w);
     energies_[w].resize(static_cast<std::size_t>(moved.cols()));
     Eigen::Map<Eigen::RowVectorXd>(energies_[w].data(), moved.cols()) = moved.colwise().squaredNorm();
@@ -188,7 +187,7 @@ Eigen::VectorXd PoseSpaceEncoder::gains(double step, const WindowLayout& layout,
   const double price = worth * bits_of_entry * static_cast<double>(d) * static_cast<double>(windows.size()) /
                        static_cast<double>(window_count());
   std::vector<Eigen::VectorXd> parts((windows.size() + windows_at_once - 1) / windows_at_once);
-  tbb::parallel_for(std::size_t{0}, parts.size(), [&](std::size_t part) {
+  parallel_for(std::size_t{0}, parts.size(), [&](std::size_t part) {
     parts[part] = Eigen::VectorXd::Zero(d);
     const std::size_t end = std::min(windows.size(), (part + 1) * windows_at_once);
     for (std::size_t i = part * windows_at_once; i < end; ++i) {
@@ -245,7 +244,7 @@ void PoseSpaceEncoder::code_groups(Coding& coding, const PoseSpaceSettings& sett
   coding.statistics.assign(a.layout.groups.size(), {});
   coding.errors.assign(a.layout.groups.size(), {});
   const WindowSynthesis synthesis(a.tables, table_.skeletons.front());
-  tbb::parallel_for(std::size_t{0}, a.layout.groups.size(), [&](std::size_t g) {
+  parallel_for(std::size_t{0}, a.layout.groups.size(), [&](std::size_t g) {
     if (g % static_cast<std::size_t>(settings.sample) != 0) return;
     progress_.check_stop();
     const WindowGroup& group = a.layout.groups[g];
@@ -315,7 +314,7 @@ Attempt PoseSpaceEncoder::attempt(double step, const PoseSpaceSettings& settings
   // Scaled coefficients, and what the spectrum of their plain rounding is.
   coding.wanted.resize(windows_.size());
   std::vector<CodingStatistics> plain((windows.size() + windows_at_once - 1) / windows_at_once);
-  tbb::parallel_for(std::size_t{0}, plain.size(), [&](std::size_t part) {
+  parallel_for(std::size_t{0}, plain.size(), [&](std::size_t part) {
     const std::size_t end = std::min(windows.size(), (part + 1) * windows_at_once);
     for (std::size_t i = part * windows_at_once; i < end; ++i) {
       const std::size_t w = windows[i];

@@ -5,8 +5,7 @@
 #include <map>
 #include <numbers>
 
-#include <tbb/parallel_for.h>
-
+#include "kinespace/base/parallel.h"
 #include "kinespace/codecs/pose_space/time_blocks.h"
 #include "kinespace/codecs/rma/contact_ik.h"
 #include "kinespace/codecs/rma/detail/spline_fit.h"
@@ -44,8 +43,8 @@ RepeatEncoder::RepeatEncoder(std::span<const Clip> clips, const Preparation& pre
   progress_.check_stop();
   contacts_.resize(clips_.size());
   if (!preparation_.contacts) return;
-  tbb::parallel_for(std::size_t{0}, clips_.size(),
-                    [&](std::size_t c) { contacts_[c] = find_contacts(clips_[c], slow_contacts); });
+  parallel_for(std::size_t{0}, clips_.size(),
+               [&](std::size_t c) { contacts_[c] = find_contacts(clips_[c], slow_contacts); });
 }
 
 // Moments of the pose vectors and the metric, and with them the exact basis.
@@ -68,7 +67,7 @@ void RepeatEncoder::cut(std::size_t clip, double step) {
 }
 
 void RepeatEncoder::plan(double step) {
-  tbb::parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { cut(c, step); });
+  parallel_for(std::size_t{0}, clips_.size(), [&](std::size_t c) { cut(c, step); });
   windows_.clear();
   first_of_clip_.assign(1, 0);
   jumps_.clear();
@@ -97,7 +96,7 @@ void RepeatEncoder::plan(double step) {
     which.push_back(at->second);
   }
   made.resize(wanted.size());
-  tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) {
+  parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) {
     made[i] = std::make_shared<const WindowTransform>(wanted[i].first, wanted[i].second);
   });
   transforms_.clear();
@@ -192,7 +191,7 @@ void RepeatEncoder::find_predictions(double step) {
   const Eigen::MatrixXd projection = (exact_.basis.transpose() * metric_).topRows(std::min(planned_components, d));
   std::vector<WindowPrediction> candidates(windows_.size());
   std::vector<double> gain(windows_.size(), 0.0);
-  tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+  parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
     candidates[w] = candidate(w);
     if (!candidates[w].used()) return;
     std::vector<double> own = own_vectors(w);
@@ -251,7 +250,7 @@ void RepeatEncoder::choose_basis(double step, PoseSpaceTables& tables) const {
   const int d = aligned_.reference.dimensions();
   const Eigen::MatrixXd projection = exact_.basis.transpose() * metric_;
   std::vector<Eigen::VectorXd> gains(windows_.size());
-  tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+  parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
     gains[w] = Eigen::VectorXd::Zero(d);
     const std::vector<double> own = own_vectors(w);
     const std::vector<double> z = analyse(w, own, projection);
@@ -290,7 +289,7 @@ void RepeatEncoder::code(Coding& coding, bool is_predicted, bool final) const {
   const int components = tables.tables.basis.components;
   if (!final) {
     std::vector<CodingStatistics> parts(windows_.size());
-    tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+    parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
       if (tables.predictions[w].used() != is_predicted) return;
       parts[w].add_plain(coding.wanted[w], transforms_[w]->functions(), windows_[w].points,
                          table_.clips[static_cast<std::size_t>(windows_[w].clip)].rate_hz, components);
@@ -304,7 +303,7 @@ void RepeatEncoder::code(Coding& coding, bool is_predicted, bool final) const {
   coding.groups.resize(groups);
   coding.layers.resize(groups);
   std::vector<CodingStatistics> statistics(groups);
-  tbb::parallel_for(std::size_t{0}, groups, [&](std::size_t g) {
+  parallel_for(std::size_t{0}, groups, [&](std::size_t g) {
     progress_.check_stop();
     const GroupPart part = group_part(*coding.layout, tables, g, is_predicted);
     const auto next = std::make_shared<RepeatGroup>(coding.groups[g] ? *coding.groups[g] : RepeatGroup{});
@@ -381,7 +380,7 @@ RepeatAttempt RepeatEncoder::attempt(double step, bool predict) const {
   tables.predicted.spectrum = tables.tables.coding.spectrum;
   coding.wanted.resize(windows_.size());
   const auto own_of = [&](std::size_t w) { return own_vectors(w); };
-  tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+  parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
     if (!tables.predictions[w].used()) coding.wanted[w] = analyse(w, own_of(w), coding.projection);
   });
   code(coding, false, false);
@@ -389,7 +388,7 @@ RepeatAttempt RepeatEncoder::attempt(double step, bool predict) const {
     // Against what the decoder will have.
     const RepeatDecoder decoder(
         coding.attempt.clips, tables, *coding.layout, [&](std::size_t g) { return coding.groups[g]; }, "the stream");
-    tbb::parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
+    parallel_for(std::size_t{0}, windows_.size(), [&](std::size_t w) {
       if (!tables.predictions[w].used()) return;
       std::vector<double> own = own_of(w);
       const std::vector<double> told = decoder.predicted_vectors(w);

@@ -5,8 +5,8 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <tbb/parallel_for.h>
 
+#include "kinespace/base/parallel.h"
 #include "kinespace/motion/kinematics.h"
 
 namespace kinespace {
@@ -242,7 +242,7 @@ EasedError measure_eased(std::span<const Clip> originals, std::span<const ClipSe
   const auto error = [&](std::size_t c, const Clip& decoded) {
     parts[c] = clip_error(originals[c], decoded, 0, originals[c].frames, 0);
   };
-  tbb::parallel_for(std::size_t{0}, originals.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, originals.size(), [&](std::size_t c) {
     progress.check_stop();
     const Clip decoded = decode(c);
     error(c, decoded);
@@ -256,7 +256,7 @@ EasedError measure_eased(std::span<const Clip> originals, std::span<const ClipSe
     out.limit_cm_s =
         static_cast<int>(std::clamp(std::floor(all.quantile(limit_quantile)), 1.0, double{most_seam_limit}));
   }
-  tbb::parallel_for(std::size_t{0}, originals.size(), [&](std::size_t c) {
+  parallel_for(std::size_t{0}, originals.size(), [&](std::size_t c) {
     if (largest[c] <= out.limit_cm_s) return;
     progress.check_stop();
     Clip decoded = decode(c);
