@@ -15,10 +15,6 @@ namespace kinespace {
 // failed first, so nobody outside of a loop meets this.
 struct LoopCancelled {};
 
-// Throws LoopCancelled inside a loop that has failed elsewhere. For what else of oneTBB is called directly (a sort, a
-// pipeline), after it.
-void throw_if_cancelled();
-
 namespace parallel_internal {
 // Calls steps(body, begin, end) for parts that cover first to last.
 void run(std::int64_t first, std::int64_t last, const void* body,

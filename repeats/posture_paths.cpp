@@ -6,9 +6,6 @@
 #include <tuple>
 #include <utility>
 
-#include <tbb/parallel_sort.h>
-
-#include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/option_range.h"
 #include "kinespace/repeats/detail/path_bridges.h"
 #include "kinespace/repeats/detail/table_minima.h"
@@ -62,8 +59,7 @@ class PathTracer {
         if (minima_.pixels[p].both) out.push_back({minima_.pixels[p].square, i, p});
       }
     }
-    tbb::parallel_sort(out.begin(), out.end());
-    throw_if_cancelled();
+    std::sort(out.begin(), out.end());
     return out;
   }
 

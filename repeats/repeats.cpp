@@ -1,9 +1,8 @@
 #include "kinespace/repeats/repeats.h"
 
 #include <algorithm>
+#include <mutex>
 #include <numeric>
-
-#include <tbb/parallel_pipeline.h>
 
 #include "kinespace/base/parallel.h"
 #include "kinespace/repeats/detail/option_range.h"
@@ -47,7 +46,7 @@ double RepeatAnalysis::share(RepeatClip::Kind kind) const {
 namespace {
 
 // Tables that are in memory at a time.
-constexpr std::size_t tables_at_once = 4;
+constexpr int tables_at_once = 4;
 
 // One self-distance table to go through, and what was chosen in it.
 struct Work {
@@ -107,13 +106,6 @@ RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& opt
   });
 
   std::vector<Work> work = work_of(out, table, options);
-  std::size_t next = 0;
-  const auto draw = [&](tbb::flow_control& control) -> Work* {
-    progress.check_stop();
-    if (next < work.size()) return &work[next++];
-    control.stop();
-    return nullptr;
-  };
   const auto choose = [&](Work* item) {
     ClipCollector collector(table, options.choice.shortest_s);
     if (options.find_repeats) {
@@ -126,9 +118,16 @@ RepeatAnalysis analyse_repeats(const FrameTable& table, const RepeatOptions& opt
     }
     item->clips = std::move(collector).finish();
   };
-  tbb::parallel_pipeline(tables_at_once, tbb::make_filter<void, Work*>(tbb::filter_mode::serial_in_order, draw) &
-                                             tbb::make_filter<Work*, void>(tbb::filter_mode::parallel, choose));
-  throw_if_cancelled();
+  std::mutex drawing;
+  std::size_t next = 0;
+  const auto draw = [&]() -> Work* {
+    const std::lock_guard one(drawing);
+    progress.check_stop();
+    return next < work.size() ? &work[next++] : nullptr;
+  };
+  parallel_for(0, tables_at_once, [&](int) {
+    while (Work* item = draw()) choose(item);
+  });
   out.clips = merged(work);
   return out;
 }

@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 #include <tbb/global_control.h>
-#include <tbb/parallel_pipeline.h>
 
 #include "kinespace/base/error.h"
 #include "kinespace/base/parallel.h"
@@ -90,24 +89,18 @@ class PoseSpaceReader final : public ClipReader {
 
   // Groups are decoded and measured several at a time, and added up in their order.
   [[nodiscard]] ClipErrorSums error_of(std::span<const Clip> originals) const {
-    const std::size_t at_once = 2 * tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
+    const std::size_t at_once = 4 * tbb::global_control::active_value(tbb::global_control::max_allowed_parallelism);
     std::vector<ClipErrorSums> clips(originals.size());
-    std::size_t next = 0;
-    const auto draw = [&](tbb::flow_control& control) {
-      if (next == layout_.groups.size()) control.stop();
-      return next++;
-    };
-    const auto measure = [&](std::size_t g) { return group_errors(g, originals); };
-    const auto add = [&](const std::vector<RunErrors>& runs) {
-      for (const RunErrors& run : runs) {
-        for (const JointError& joint : run.joints) clips[run.clip].add(joint);
+    std::vector<std::vector<RunErrors>> measured(at_once);
+    for (std::size_t from = 0; from < layout_.groups.size(); from += at_once) {
+      const std::size_t to = std::min(from + at_once, layout_.groups.size());
+      parallel_for(from, to, [&](std::size_t g) { measured[g - from] = group_errors(g, originals); });
+      for (std::size_t g = from; g < to; ++g) {
+        for (const RunErrors& run : measured[g - from]) {
+          for (const JointError& joint : run.joints) clips[run.clip].add(joint);
+        }
       }
-    };
-    tbb::parallel_pipeline(
-        at_once, tbb::make_filter<void, std::size_t>(tbb::filter_mode::serial_in_order, draw) &
-                     tbb::make_filter<std::size_t, std::vector<RunErrors>>(tbb::filter_mode::parallel, measure) &
-                     tbb::make_filter<std::vector<RunErrors>, void>(tbb::filter_mode::serial_in_order, add));
-    throw_if_cancelled();
+    }
     ClipErrorSums out;
     for (const ClipErrorSums& clip : clips) out.add(clip);
     return out;

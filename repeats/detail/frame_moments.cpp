@@ -4,8 +4,6 @@
 #include <vector>
 
 #include <Eigen/Eigenvalues>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_reduce.h>
 
 #include "kinespace/base/parallel.h"
 
@@ -31,40 +29,46 @@ struct Sums {
   Eigen::MatrixXd products;  // lower triangle
 };
 
-class SumBody {
- public:
-  SumBody(const FrameTable& table, std::span<const FrameSpan> blocks, const Eigen::VectorXd& origin)
-      : table_(table), blocks_(blocks), origin_(origin) {
-    clear();
+Sums sums_of(const FrameTable& table, std::span<const FrameSpan> blocks, const Eigen::VectorXd& origin) {
+  Sums out{Eigen::VectorXd::Zero(table.dimensions), Eigen::MatrixXd::Zero(table.dimensions, table.dimensions)};
+  Eigen::MatrixXd frames;
+  for (const FrameSpan& block : blocks) {
+    frames = frame_matrix(table, block).cast<double>().colwise() - origin;
+    out.sum += frames.rowwise().sum();
+    out.products.selfadjointView<Eigen::Lower>().rankUpdate(frames);
   }
-  SumBody(SumBody& other, tbb::split /*tag*/) : table_(other.table_), blocks_(other.blocks_), origin_(other.origin_) {
-    clear();
-  }
-  void operator()(const tbb::blocked_range<std::size_t>& range) {
-    Eigen::MatrixXd frames;
-    for (std::size_t b = range.begin(); b != range.end(); ++b) {
-      frames = frame_matrix(table_, blocks_[b]).cast<double>().colwise() - origin_;
-      sums_.sum += frames.rowwise().sum();
-      sums_.products.selfadjointView<Eigen::Lower>().rankUpdate(frames);
-    }
-  }
-  void join(const SumBody& other) {
-    sums_.sum += other.sums_.sum;
-    sums_.products += other.sums_.products;
-  }
-  [[nodiscard]] const Sums& sums() const { return sums_; }
+  return out;
+}
 
- private:
-  void clear() {
-    sums_.sum = Eigen::VectorXd::Zero(table_.dimensions);
-    sums_.products = Eigen::MatrixXd::Zero(table_.dimensions, table_.dimensions);
+// Cut in halves until no part has more than `grain` blocks: sums do not depend on how many processors make them.
+void cut_in_halves(std::span<const FrameSpan> blocks, std::size_t grain, std::vector<std::span<const FrameSpan>>& out) {
+  if (blocks.size() <= grain) {
+    out.push_back(blocks);
+    return;
   }
+  cut_in_halves(blocks.first(blocks.size() / 2), grain, out);
+  cut_in_halves(blocks.subspan(blocks.size() / 2), grain, out);
+}
 
-  const FrameTable& table_;
-  std::span<const FrameSpan> blocks_;
-  const Eigen::VectorXd& origin_;
-  Sums sums_;
-};
+// Adds up the parts of cut_in_halves() the way they were cut.
+Sums joined(std::size_t blocks, std::size_t grain, std::vector<Sums>::iterator& next) {
+  if (blocks <= grain) return std::move(*next++);
+  Sums out = joined(blocks / 2, grain, next);
+  const Sums other = joined(blocks - blocks / 2, grain, next);
+  out.sum += other.sum;
+  out.products += other.products;
+  return out;
+}
+
+Sums sums_in_parallel(const FrameTable& table, std::span<const FrameSpan> blocks, const Eigen::VectorXd& origin) {
+  const std::size_t grain = std::max<std::size_t>(8, blocks.size() / 32);
+  std::vector<std::span<const FrameSpan>> parts;
+  cut_in_halves(blocks, grain, parts);
+  std::vector<Sums> sums(parts.size());
+  parallel_for(std::size_t{0}, parts.size(), [&](std::size_t i) { sums[i] = sums_of(table, parts[i], origin); });
+  auto next = sums.begin();
+  return joined(blocks.size(), grain, next);
+}
 
 }  // namespace
 
@@ -77,14 +81,11 @@ FrameMoments frame_moments(const FrameTable& table, std::span<const FrameSpan> r
   if (out.count == 0) return out;
 
   const Eigen::VectorXd origin = frame_matrix(table, {blocks.front().first, blocks.front().first + 1}).cast<double>();
-  SumBody body(table, blocks, origin);
-  const std::size_t grain = std::max<std::size_t>(8, blocks.size() / 32);
-  tbb::parallel_deterministic_reduce(tbb::blocked_range<std::size_t>(0, blocks.size(), grain), body);
-  throw_if_cancelled();
+  const Sums sums = sums_in_parallel(table, blocks, origin);
   const double n = static_cast<double>(out.count);
-  const Eigen::VectorXd shift = body.sums().sum / n;
+  const Eigen::VectorXd shift = sums.sum / n;
   out.mean = origin + shift;
-  out.covariance = body.sums().products.selfadjointView<Eigen::Lower>();
+  out.covariance = sums.products.selfadjointView<Eigen::Lower>();
   out.covariance = out.covariance / n - shift * shift.transpose();
   return out;
 }
