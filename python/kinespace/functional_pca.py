@@ -138,8 +138,10 @@ def _numbers(values: "npt.ArrayLike", name: str, of: str, columns: Optional[int]
         raise ValueError(f"{name}: shape {given.shape}, expected [curves, {of}], at least one of each")
     if columns is not None and array.shape[1] != columns:
         raise ValueError(f"{name}: {array.shape[1]} {of}, expected {columns} as in fit")
-    finite = np.isfinite(array)
-    if not finite.all():
-        row, column = np.argwhere(~finite)[0]
+    # A sum is not finite where a number is not: one quick look, and a second one only then (a sum may overflow).
+    with np.errstate(over="ignore", invalid="ignore"):
+        suspect = not np.isfinite(array.sum())
+    if suspect and not np.isfinite(array).all():
+        row, column = np.argwhere(~np.isfinite(array))[0]
         raise ValueError(f"{name}: {array[row, column]} in row {row}, column {column}, expected finite numbers (no NaN, no infinity)")
     return array

@@ -1,12 +1,16 @@
 """The package as a whole: types, examples, what the manual shows, and what the extension shows to others."""
 import ast
+import inspect
 import os
+import pathlib
 import re
 import shutil
 import subprocess
 import sys
 import unittest
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "checks"))
+from docs_test import difference
 from support import BUILD, FOLDER, SOURCE, library_file, samples
 
 import kinespace
@@ -54,8 +58,6 @@ class PackageTest(unittest.TestCase):
             self.assertTrue(hasattr(kinespace, name))
 
     def test_defaults_are_those_of_the_library(self):
-        import inspect
-
         shown = _kinespace.build_library.__doc__
         for name, parameter in inspect.signature(kinespace.MotionSpace.build).parameters.items():
             if parameter.default is not inspect.Parameter.empty:
@@ -74,7 +76,9 @@ class PackageTest(unittest.TestCase):
         for code, shown in blocks:
             program.append(code)
             wanted += shown.splitlines()
-        self.assertEqual(run([sys.executable, "-c", "\n".join(program)]).splitlines(), wanted)
+        printed = run([sys.executable, "-c", "\n".join(program)]).splitlines()
+        self.assertIsNone(difference(wanted, printed))
+        self.assertEqual(len(printed), len(wanted))
 
     def test_the_extension_is_free_of_the_gpl_and_keeps_its_names(self):
         self.assertNotIn("alglib", run(["ldd", _kinespace.__file__]))
