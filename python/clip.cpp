@@ -23,6 +23,7 @@
 #include "kinespace/motion/read.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/documented.h"
 #include "python/watch.h"
 
 namespace py = pybind11;
@@ -95,7 +96,7 @@ std::string description(const Clip& clip) {
 }
 
 void bind_clip_class(py::module_& module) {
-  py::class_<Clip>(module, "Clip")
+  DocumentedClass<Clip>(module, "Clip")
       .def_property(
           "name", [](const Clip& clip) { return text(clip.name); },
           [](Clip& clip, const py::str& name) { clip.name = bytes_of(name); })
@@ -179,17 +180,17 @@ std::vector<std::string> codec_names() {
 
 void bind_clips(py::module_& module) {
   bind_clip_class(module);
-  module.def("read_clip", &read_clip, py::arg("path"), py::arg("asf") = py::none(),
-             py::call_guard<py::gil_scoped_release>());
+  def_documented(module, "read_clip", &read_clip, py::arg("path"), py::arg("asf") = py::none(),
+                 py::call_guard<py::gil_scoped_release>());
   module.def("find_motion_files", &find_motion_files, py::arg("paths"), py::call_guard<py::gil_scoped_release>());
   module.def(
       "clip_names", [](const std::vector<fs::path>& files) { return texts(clip_names(files)); }, py::arg("files"));
   module.def("codec_names", &codec_names);
-  module.def("encode_clips", &encode_clips, py::arg("clips"), py::arg("out"), py::kw_only(), py::arg("codec"),
-             py::arg("mean_error_cm"), py::arg("max_error_cm"), py::arg("bytes"), py::arg("settings"), py::arg("basis"),
-             py::arg("progress"));
-  module.def("decode_clips", &decode_clips, py::arg("path"), py::kw_only(), py::arg("level"), py::arg("basis"),
-             py::call_guard<py::gil_scoped_release>());
+  def_documented(module, "encode_clips", &encode_clips, py::arg("clips"), py::arg("out"), py::kw_only(),
+                 py::arg("codec"), py::arg("mean_error_cm"), py::arg("max_error_cm"), py::arg("bytes"),
+                 py::arg("settings"), py::arg("basis"), py::arg("progress"));
+  def_documented(module, "decode_clips", &decode_clips, py::arg("path"), py::kw_only(), py::arg("level"),
+                 py::arg("basis"), py::call_guard<py::gil_scoped_release>());
 }
 
 }  // namespace kinespace::python

@@ -28,6 +28,7 @@
 #include "kinespace/synthesis/retrieval.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/documented.h"
 #include "python/watch.h"
 
 namespace py = pybind11;
@@ -249,30 +250,30 @@ std::string description(const OpenLibrary& library) {
 }
 
 template <auto query>
-void bind_query(py::class_<OpenLibrary>& library) {
+void bind_query(DocumentedClass<OpenLibrary>& library) {
   library.def("query", query, py::arg("clip"), py::arg("k") = 10, py::kw_only(), py::arg("rerank") = true,
               py::arg("weighted") = false, py::arg("labels") = std::vector<py::str>(), py::arg("device") = "auto",
               py::arg("progress") = py::none());
 }
 
 void bind_library_class(py::module_& module) {
-  py::class_<Match>(module, "Match")
+  DocumentedClass<Match>(module, "Match")
       .def_property_readonly("clip", [](const Match& match) { return text(match.clip); })
       .def_property_readonly("labels", [](const Match& match) { return texts(match.labels); })
-      .def_readonly("distance", &Match::distance)
-      .def_readonly("vector_distance", &Match::vector_distance)
-      .def_readonly("start", &Match::start_s)
-      .def_readonly("end", &Match::end_s)
+      .def_property_readonly("distance", [](const Match& match) { return match.distance; })
+      .def_property_readonly("vector_distance", [](const Match& match) { return match.vector_distance; })
+      .def_property_readonly("start", [](const Match& match) { return match.start_s; })
+      .def_property_readonly("end", [](const Match& match) { return match.end_s; })
       .def("__repr__", [](const Match& match) {
         return text(fmt::format("<kinespace.Match '{}' at {:.5g}>", match.clip, match.distance));
       });
 
-  py::class_<OpenLibrary> library(module, "Library");
-  library.def(py::init([](const fs::path& path) {
-                const py::gil_scoped_release released;
-                return std::make_unique<OpenLibrary>(path);
-              }),
-              py::arg("path"));
+  DocumentedClass<OpenLibrary> library(module, "Library");
+  library.def_constructor(py::init([](const fs::path& path) {
+                            const py::gil_scoped_release released;
+                            return std::make_unique<OpenLibrary>(path);
+                          }),
+                          py::arg("path"));
   library.def_property_readonly("path", &OpenLibrary::path);
   library.def_property_readonly("clips", &names);
   library.def_property_readonly("labels", &labels);
@@ -347,11 +348,12 @@ void bind_library(py::module_& module) {
   bind_library_class(module);
   const MotionSpaceOptions space;
   const SequenceOptions sequences;
-  module.def("build_library", &build, py::arg("paths"), py::arg("out"), py::kw_only(), py::arg("add") = false,
-             py::arg("by_skeleton") = false, py::arg("asf") = py::none(), py::arg("variance") = space.variance_share,
-             py::arg("functions") = py::none(), py::arg("points") = space.points, py::arg("grouping") = "all",
-             py::arg("smooth") = false, py::arg("cycles") = sequences.most_cycles, py::arg("align") = true,
-             py::arg("device") = "auto", py::arg("progress") = py::none());
+  def_documented(module, "build_library", &build, py::arg("paths"), py::arg("out"), py::kw_only(),
+                 py::arg("add") = false, py::arg("by_skeleton") = false, py::arg("asf") = py::none(),
+                 py::arg("variance") = space.variance_share, py::arg("functions") = py::none(),
+                 py::arg("points") = space.points, py::arg("grouping") = "all", py::arg("smooth") = false,
+                 py::arg("cycles") = sequences.most_cycles, py::arg("align") = true, py::arg("device") = "auto",
+                 py::arg("progress") = py::none());
 }
 
 }  // namespace kinespace::python

@@ -12,6 +12,7 @@
 #include "kinespace/version.h"
 #include "python/arrays.h"
 #include "python/bindings.h"
+#include "python/documented.h"
 
 namespace py = pybind11;
 
@@ -45,12 +46,7 @@ void raise(const Error& error) {
 }
 
 void bind_errors(py::module_& module) {
-  error_type = PyErr_NewExceptionWithDoc(
-      "kinespace.Error",
-      "Bad input (a file, a stream, an option), or a machine that cannot go on.\n\n"
-      "str(error) names the file and line, what was found, what was expected and what to do.\n"
-      "kind: \"bad_input\", \"usage\" or \"machine\". file: str or None. line: from 1, or None.",
-      nullptr, nullptr);
+  error_type = PyErr_NewExceptionWithDoc("kinespace.Error", docstring("Error"), nullptr, nullptr);
   if (error_type == nullptr) throw py::error_already_set();
   module.add_object("Error", py::reinterpret_borrow<py::object>(error_type));
   py::register_exception_translator([](std::exception_ptr thrown) {
@@ -106,6 +102,7 @@ py::dict fit(const Curves& curves, std::optional<int> count, double share, std::
 
 PYBIND11_MODULE(_kinespace, module) {
   module.doc() = "What kinespace is in C++; the package kinespace is what to import.";
+  module.attr("__version__") = KINESPACE_VERSION;
   bind_errors(module);
   module.def("fit_functional_pca", &fit, py::arg("curves").noconvert(), py::kw_only(), py::arg("count"),
              py::arg("share"), py::arg("smoothing"), py::arg("start"), py::arg("end"));

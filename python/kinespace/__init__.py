@@ -9,7 +9,7 @@
 Units: centimetres, seconds, Y up, unit quaternions (w, x, y, z). Arrays are views of the library's own memory where that is said. Long calls let
 other threads run, stop at Ctrl-C, and take `progress`, a function that is called with the stage and its share done.
 """
-from ._kinespace import Clip, Error, Library, Match, build_library, read_clip
+from ._kinespace import Clip, Error, Library, Match, __version__, build_library, read_clip
 from .codecs import codecs, decode, encode
 from .functional_pca import FunctionalPCA, NotFittedError
 from .motion_space import MotionSpace, find_motion_files
@@ -22,6 +22,7 @@ __all__ = [
     "Match",
     "MotionSpace",
     "NotFittedError",
+    "__version__",
     "build_library",
     "codecs",
     "decode",

@@ -6,6 +6,8 @@ from typing import Callable, Dict, List, Optional, Sequence, Tuple, TypedDict, U
 import numpy as np
 import numpy.typing as npt
 
+__version__: str
+
 Path = Union[str, "os.PathLike[str]"]
 # Called with the stage and its share done, 0 to 1; what it raises stops the work and is raised by the call.
 Progress = Callable[[str, float], object]

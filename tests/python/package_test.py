@@ -57,6 +57,11 @@ class PackageTest(unittest.TestCase):
         for name in kinespace.__all__:
             self.assertTrue(hasattr(kinespace, name))
 
+    def test_help_says_what_the_stub_says(self):
+        for of, words in ((kinespace.Clip.positions, "[frames, joints, 3]: world positions in cm"), (kinespace.Library.query, "nearest first"),
+                          (kinespace.Error, "file and line"), (kinespace.read_clip, "by its ending"), (kinespace.Library, "they take turns")):
+            self.assertIn(words, of.__doc__)
+
     def test_defaults_are_those_of_the_library(self):
         shown = _kinespace.build_library.__doc__
         for name, parameter in inspect.signature(kinespace.MotionSpace.build).parameters.items():
