@@ -74,8 +74,8 @@ class OpenLibrary {
  private:
   class Turn {
    public:
-    explicit Turn(std::atomic<std::thread::id>& whose) : whose_(whose) { whose_ = std::this_thread::get_id(); }
-    ~Turn() { whose_ = std::thread::id(); }
+    explicit Turn(std::atomic<std::thread::id>& whose) : whose_(whose) { whose_.store(std::this_thread::get_id()); }
+    ~Turn() { whose_.store({}); }
     Turn(const Turn&) = delete;
     Turn& operator=(const Turn&) = delete;
 
