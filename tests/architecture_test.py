@@ -32,10 +32,11 @@ ARROWS = {
     "examples": "base motion storage kernels fpca library footskate synthesis mesh codecs",
     "bench": "base numerics alglib motion storage kernels fpca library footskate synthesis repeats mesh entropy codecs mesh_codecs examples",
     "cli": "base motion storage kernels fpca library footskate synthesis repeats mesh codecs mesh_codecs bench",
+    "python": "base motion kernels fpca library synthesis codecs",
     "tests": "base numerics alglib gltf motion storage kernels fpca library footskate synthesis repeats mesh entropy codecs mesh_codecs examples bench cli",
 }
 # Folders whose headers are included as kinespace/FOLDER/..., as those who install the library include them.
-LIBRARIES = set(ARROWS) - {"include", "examples", "bench", "cli", "tests"}
+LIBRARIES = set(ARROWS) - {"include", "examples", "bench", "cli", "python", "tests"}
 ARROWS = {folder: set(others.split()) | {folder} for folder, others in ARROWS.items()}
 
 LONGEST_FILE = 900
