@@ -11,6 +11,7 @@
 
 #include "bench/bench_library.h"
 #include "bench/report.h"
+#include "kinespace/base/parallel.h"
 #include "kinespace/licence.h"
 #include "kinespace/synthesis/connection.h"
 #include "kinespace/synthesis/motion_graph.h"
@@ -18,7 +19,6 @@
 #include "kinespace/synthesis/transition_plan.h"
 #if KINESPACE_ALGLIB
 #include "kinespace/alglib/minimum.h"
-#include "kinespace/base/parallel.h"
 #endif
 
 namespace kinespace {
