@@ -4,6 +4,7 @@
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/option_checks.h"
 #include "cli/synthesis_output.h"
 #include "kinespace/motion/file_formats.h"
 #include "kinespace/motion/read.h"
@@ -55,7 +56,7 @@ void add_blend(CLI::App& app, Session& session) {
       ->add_option("--neighbours", options->blend.neighbours,
                    "Near motions of each clip that may be control points; 0: none")
       ->capture_default_str();
-  command->add_option("--lod", options->functions, "Use only the first N functions")->check(CLI::NonNegativeNumber);
+  command->add_option("--lod", options->functions, "Use only the first N functions")->check(number_from_zero());
   command->add_flag("--clean-feet", options->output.clean_feet, "Take foot skate out of the result");
   command->add_option("--picture", options->output.picture, "Also write stick figures, .svg");
   command->add_flag("--json", options->output.json, "Print the figures as one JSON object");

@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/device_choice.h"
 #include "cli/json_output.h"
+#include "cli/option_checks.h"
 #include "cli/stage_log.h"
 #include "kinespace/library/library_builder.h"
 #include "kinespace/motion/file_formats.h"
@@ -55,6 +56,16 @@ Grouping grouping_of(const std::string& name) {
   return Grouping::all_together;
 }
 
+// A library that grows keeps the functions that it was made with, whatever would be asked of them now.
+void refuse_options_of_functions(const CLI::App& command) {
+  for (const char* name : {"--variance", "--functions", "--points", "--grouping", "--smooth"}) {
+    if (command.count(name) == 0) continue;
+    throw Error(ErrorKind::usage, {.found = fmt::format("{} with --add", name),
+                                   .expected = "the choice that the library was made with, which it keeps",
+                                   .remedy = "leave it out, or build the whole library anew"});
+  }
+}
+
 // A build that is stopped keeps what it has read.
 std::string what_a_stopped_build_leaves(const std::filesystem::path& output) {
   const std::string partial = output.string() + ".partial";
@@ -99,12 +110,13 @@ void add_build(CLI::App& app, Session& session) {
                    fmt::format("Clips ({}), or folders with clips anywhere below them", listed(clip_endings_read())))
       ->required();
   command->add_option("-o,--output", options->output, "The library to make, LIB.kspace")->required();
-  command->add_flag("--add", library.add, "Add to the library that is there instead of replacing it");
+  command->add_flag("--add", library.add,
+                    "Add to the library that is there instead of replacing it; it keeps the choices it was made with");
   command->add_flag("--by-skeleton", library.by_skeleton, "One space for each joint tree, where clips have several");
   command->add_option("--asf", options->asf, "The skeleton of the .amc clips (else found beside each)");
   command->add_option("--variance", library.space.space.variance_share, "Share of variance the functions must cover")
       ->capture_default_str();
-  command->add_option("--functions", options->functions, "This many functions instead")->check(CLI::PositiveNumber);
+  command->add_option("--functions", options->functions, "This many functions instead")->check(number_above_zero());
   command
       ->add_option("--points", library.space.space.points, "Points of a sequence's time grid (0: from the frame rate)")
       ->capture_default_str();
@@ -124,7 +136,11 @@ void add_build(CLI::App& app, Session& session) {
   command->add_flag("--json", options->json, "Print the result as one JSON object");
   session.files.reads(command, {"CLIPS", "--asf"});
   session.files.writes(command, {"--output"}, FileKind::database);
-  command->callback([options, &session] { run_build(*options, session); });
+  command->callback([command, options, &session] {
+    // With --by-skeleton there may be joint trees that the library has no functions for yet.
+    if (options->library.add && !options->library.by_skeleton) refuse_options_of_functions(*command);
+    run_build(*options, session);
+  });
 }
 
 }  // namespace kinespace::cli

@@ -13,6 +13,7 @@
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/option_checks.h"
 #include "cli/stream_file.h"
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
@@ -177,10 +178,10 @@ void add_decode(CLI::App& app, Session& session) {
                    "A folder, or for one clip a file: " + listed(clip_endings_written()))
       ->required();
   command->add_option("--clip", options->clip, "Only the clip of that name");
-  command->add_option("--from", options->from_s, "From this time on, in seconds")->check(CLI::NonNegativeNumber);
-  command->add_option("--to", options->to_s, "Up to this time, in seconds")->check(CLI::NonNegativeNumber);
+  command->add_option("--from", options->from_s, "From this time on, in seconds")->check(number_from_zero());
+  command->add_option("--to", options->to_s, "Up to this time, in seconds")->check(number_from_zero());
   command->add_option("--basis", options->basis, "The library that the stream was encoded with, if it was with one");
-  command->add_option("--level", options->level, "Only so many levels of detail")->check(CLI::NonNegativeNumber);
+  command->add_option("--level", options->level, "Only so many levels of detail")->check(number_from_zero());
   command->add_option("--joint", options->joint, "Only that joint, without the others' bytes (streams of qbc)");
   command->add_flag("--preview", options->preview, "Only the frames that need no decoding (streams of qbc)")
       ->excludes("--joint")

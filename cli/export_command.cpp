@@ -11,6 +11,7 @@
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/option_checks.h"
 #include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
 #include "kinespace/footskate/foot_planter.h"
@@ -230,12 +231,12 @@ void add_export(CLI::App& app, Session& session) {
   command->add_option("-o,--output", options->output, "The file to write: " + listed(clip_endings_written()))
       ->required();
   CLI::Option* lod =
-      command->add_option("--lod", options->functions, "Use only the first N functions")->check(CLI::NonNegativeNumber);
+      command->add_option("--lod", options->functions, "Use only the first N functions")->check(number_from_zero());
   CLI::Option* max_error =
       command
           ->add_option("--max-error", options->max_error_cm,
                        "The fewest functions with every joint this near to the clip as it was read, in cm")
-          ->check(CLI::NonNegativeNumber)
+          ->check(number_from_zero())
           ->excludes(lod);
   command
       ->add_flag("--plant-feet", options->plant_feet,

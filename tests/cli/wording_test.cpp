@@ -131,6 +131,22 @@ TEST_F(Wording, numbers_out_of_range_are_told_by_their_options) {
               HasSubstr("kinespace: --error 0, expected"));
 }
 
+TEST_F(Wording, numbers_that_are_none_and_options_that_would_do_nothing_are_refused) {
+  for (const std::string& number : {std::string("nan"), std::string("inf"), std::string("-1"), std::string("1cm")}) {
+    EXPECT_THAT(message({"export", library(), "run_fast_001", "-o", at("o.bvh"), "--max-error=" + number}, 2),
+                HasSubstr("--max-error: " + number + ", expected a number, 0 or more"));
+  }
+  EXPECT_THAT(message({"build", at("clips"), "-o", at("n.kspace"), "--functions", "0"}, 2),
+              HasSubstr("--functions: 0, expected a number above 0"));
+  for (const std::vector<std::string>& choice : std::vector<std::vector<std::string>>{
+           {"--smooth"}, {"--grouping", "joint"}, {"--variance", "0.9"}, {"--functions", "5"}, {"--points", "40"}}) {
+    std::vector<std::string> arguments = {"build", at("clips"), "-o", library(), "--add"};
+    arguments.insert(arguments.end(), choice.begin(), choice.end());
+    EXPECT_THAT(message(arguments, 2), HasSubstr(choice.front() + " with --add, expected the choice that the library"));
+  }
+  EXPECT_EQ(run_command({"build", at("clips"), "-o", library(), "--add"}).code, 0);
+}
+
 TEST_F(Wording, info_lists_what_messages_say_it_lists) {
   const CommandResult result = run_command({"info", library()});
   ASSERT_EQ(result.code, 0) << result.err;
