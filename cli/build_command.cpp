@@ -56,16 +56,6 @@ Grouping grouping_of(const std::string& name) {
   return Grouping::all_together;
 }
 
-// A library that grows keeps the functions that it was made with, whatever would be asked of them now.
-void refuse_options_of_functions(const CLI::App& command) {
-  for (const char* name : {"--variance", "--functions", "--points", "--grouping", "--smooth"}) {
-    if (command.count(name) == 0) continue;
-    throw Error(ErrorKind::usage, {.found = fmt::format("{} with --add", name),
-                                   .expected = "the choice that the library was made with, which it keeps",
-                                   .remedy = "leave it out, or build the whole library anew"});
-  }
-}
-
 // A build that is stopped keeps what it has read.
 std::string what_a_stopped_build_leaves(const std::filesystem::path& output) {
   const std::string partial = output.string() + ".partial";
@@ -136,11 +126,7 @@ void add_build(CLI::App& app, Session& session) {
   command->add_flag("--json", options->json, "Print the result as one JSON object");
   session.files.reads(command, {"CLIPS", "--asf"});
   session.files.writes(command, {"--output"}, FileKind::database);
-  command->callback([command, options, &session] {
-    // With --by-skeleton there may be joint trees that the library has no functions for yet.
-    if (options->library.add && !options->library.by_skeleton) refuse_options_of_functions(*command);
-    run_build(*options, session);
-  });
+  command->callback([options, &session] { run_build(*options, session); });
 }
 
 }  // namespace kinespace::cli

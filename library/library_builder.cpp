@@ -1,6 +1,7 @@
 #include "kinespace/library/library_builder.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <map>
 #include <set>
@@ -313,6 +314,28 @@ void require_one_tree(const std::map<std::string, std::vector<const Import*>>& b
                                      .remedy = "build them apart, or give --by-skeleton for one space each"});
 }
 
+// A library that grows keeps what its functions were made with. Defaults stand for no choice.
+void require_choices_of(const MotionSpaceOptions& kept, const MotionSpaceOptions& asked, const std::string& name) {
+  const auto differs = [&](auto MotionSpaceOptions::*field) {
+    return asked.*field != MotionSpaceOptions().*field && asked.*field != kept.*field;
+  };
+  const std::array<std::pair<const char*, bool>, 5> choices = {{
+      {"grouping", differs(&MotionSpaceOptions::grouping)},
+      {"points", differs(&MotionSpaceOptions::points)},
+      {"variance", differs(&MotionSpaceOptions::variance_share)},
+      {"functions", differs(&MotionSpaceOptions::functions)},
+      {"smooth", differs(&MotionSpaceOptions::smooth)},
+  }};
+  for (const auto& [choice, other] : choices) {
+    if (!other) continue;
+    throw Error(ErrorKind::usage,
+                {.file = name,
+                 .found = fmt::format("another choice of \"{}\" than the library was made with", choice),
+                 .expected = "its own, which it keeps when it is added to",
+                 .remedy = "leave it out, or build the whole library anew"});
+  }
+}
+
 // The spaces of one joint tree: new ones, or the library's own extended by the new clips.
 void build_tree(const std::string& tree_hash, const std::vector<const Import*>& imports,
                 const LibraryBuilderOptions& options, LibraryBuild& build, const Compute& compute,
@@ -327,6 +350,7 @@ void build_tree(const std::string& tree_hash, const std::vector<const Import*>& 
   if (old_space && old_clips) {
     const std::string name = build.target().string();
     const RegisteredSpace from = unpack_registered_space(old_space->blob, name);
+    require_choices_of(from.options(), options.space.space, name);
     const ClipSpace clips_from = ClipSpace::unpack(old_clips->blob, name);
     const BuiltSpace built = extend_space(from, source, options.space, compute, progress);
     const ClipSpace clips = clips_from.extend(source, compute, progress);

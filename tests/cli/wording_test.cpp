@@ -28,6 +28,8 @@ class Wording : public ::testing::Test {
       if (name.starts_with("walk") || name.starts_with("run")) write_clip(at("clips/" + name + ".bvh"), motion.clip);
     }
     ASSERT_EQ(run_command({"build", at("clips"), "-o", at("l.kspace")}).code, 0);
+    std::filesystem::create_directory(at("more"));
+    write_clip(at("more/stroll.bvh"), make_walk({.duration_s = 2}).clip);
     write_clip(at("walk.glb"), make_walk({.duration_s = 1}).clip);
   }
   static void TearDownTestSuite() { folder_.reset(); }
@@ -140,11 +142,20 @@ TEST_F(Wording, numbers_that_are_none_and_options_that_would_do_nothing_are_refu
               HasSubstr("--functions: 0, expected a number above 0"));
   for (const std::vector<std::string>& choice : std::vector<std::vector<std::string>>{
            {"--smooth"}, {"--grouping", "joint"}, {"--variance", "0.9"}, {"--functions", "5"}, {"--points", "40"}}) {
-    std::vector<std::string> arguments = {"build", at("clips"), "-o", library(), "--add"};
+    std::vector<std::string> arguments = {"build", at("more"), "-o", library(), "--add"};
     arguments.insert(arguments.end(), choice.begin(), choice.end());
-    EXPECT_THAT(message(arguments, 2), HasSubstr(choice.front() + " with --add, expected the choice that the library"));
+    EXPECT_THAT(message(arguments, 2),
+                HasSubstr("\"" + choice.front().substr(2) + "\" than the library was made with"));
   }
-  EXPECT_EQ(run_command({"build", at("clips"), "-o", library(), "--add"}).code, 0);
+  // The same choices as before are its own.
+  const auto build = [](const std::string& clips, const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"build",      clips,   "-o",         at("c.kspace"),
+                                          "--grouping", "joint", "--variance", "0.99"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run_command(arguments).code;
+  };
+  EXPECT_EQ(build(at("clips"), {}), 0);
+  EXPECT_EQ(build(at("more"), {"--add"}), 0);
 }
 
 TEST_F(Wording, info_lists_what_messages_say_it_lists) {
