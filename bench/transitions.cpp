@@ -11,11 +11,11 @@
 
 #include "bench/bench_library.h"
 #include "bench/report.h"
+#include "bench/seams.h"
 #include "kinespace/base/parallel.h"
 #include "kinespace/licence.h"
 #include "kinespace/synthesis/connection.h"
 #include "kinespace/synthesis/motion_graph.h"
-#include "kinespace/synthesis/transition.h"
 #include "kinespace/synthesis/transition_plan.h"
 #if KINESPACE_ALGLIB
 #include "kinespace/alglib/minimum.h"
@@ -191,36 +191,6 @@ double median_of(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) {
-  const std::int64_t space_id = view.library().spaces().front().id;
-  const ConnectionSpace space(view.space(space_id));
-  std::vector<ClipRow> rows;
-  for (const ClipRow& row : view.library().clips()) {
-    if (space.long_enough(static_cast<double>(row.frames - 1) / row.rate_hz)) rows.push_back(row);
-  }
-  std::vector<double> speed, acceleration;
-  for (const auto& [first, second] : random_pairs(rows.size(), 200)) {
-    const std::vector<ClipCurves> clips{view.curves(rows[first]), view.curves(rows[second])};
-    const Skeleton& skeleton = view.skeleton(rows[first].skeleton_id);
-    const Transition made = make_transition(space, clips, skeleton);
-    // Measured on what came out, not on what the search saw.
-    const JointRates of_first = joint_rates(clip_from_curves(clips[0], skeleton));
-    const JointRates of_second = joint_rates(clip_from_curves(clips[1], skeleton));
-    const std::array<const JointRates*, 2> sources{&of_first, &of_second};
-    const SeamRatios ratios = seam_ratios(joint_rates(made.clip), made.begin[0],
-                                          made.begin[0] + made.joins[0].duration_s, usual_rates(sources));
-    speed.push_back(ratios.speed);
-    acceleration.push_back(ratios.acceleration);
-  }
-  const auto row = [&](const char* name, double value, double bar) {
-    report.results.push_back({.name = name, .data = data, .value = value, .unit = "x", .bar = bar});
-  };
-  row("seam: largest joint speed over the usual, median of 200 random pairs", median_of(speed), 1);
-  row("seam: the same, worst", std::ranges::max(speed), 2);
-  row("seam: largest joint acceleration over the usual, median of 200 random pairs", median_of(acceleration), 1);
-  row("seam: the same, worst", std::ranges::max(acceleration), 2);
-}
-
 // The same through the graph, which the first pair makes and keeps in the bench's library.
 void path_rows(const std::string& data, LibraryView& view, BenchReport& report) {
   const auto rows = view.library().clips();
@@ -244,6 +214,11 @@ void path_rows(const std::string& data, LibraryView& view, BenchReport& report) 
 
 BenchReport bench_transitions(const BenchOptions& options) {
   BenchReport report{.bench = "transitions", .device = "processor", .threads = tbb::this_task_arena::max_concurrency()};
+  if (!options.clips.empty()) {
+    BenchLibrary given(options.clips);
+    seam_rows("clips", given.view(), report);
+    return report;
+  }
   BenchLibrary bandai({options.data / "bandai2"});
   connection_rows("bandai2", bandai.view(), report);
   seam_rows("bandai2", bandai.view(), report);
@@ -251,8 +226,13 @@ BenchReport bench_transitions(const BenchOptions& options) {
   path_rows("bandai2", bandai.view(), report);
   BenchLibrary cmu({options.data / "cmu"});
   connection_rows("cmu", cmu.view(), report);
-  seam_rows("cmu", cmu.view(), report);
   path_rows("cmu", cmu.view(), report);
+  BenchLibrary walks({options.data / "cmu" / "02", options.data / "cmu" / "03"});
+  seam_rows("cmu 02, 03", walks.view(), report);
+  for (const char* folder : {"hips15", "xia31"}) {
+    BenchLibrary foreign({options.data / "foreign" / folder});
+    seam_rows(std::string("foreign/") + folder, foreign.view(), report);
+  }
   return report;
 }
 

@@ -30,6 +30,7 @@ struct FootTask {
   std::vector<char> flat;                     // both: the turn of the foot is given
   std::vector<Eigen::Vector3d> turn;          // rotation vector, world
   std::vector<Eigen::Vector3d> displacement;  // cm, world, of the ankle; zero where not planted
+  std::vector<double> lift;                   // cm, of the ankle, on top of all else; empty: none
 };
 
 // The level that a foot may not go below: the ground; on uneven ground the lower of its plants before and after, or,

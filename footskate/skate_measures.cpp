@@ -3,11 +3,92 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 
 #include "kinespace/footskate/contact_model.h"
 #include "kinespace/motion/position_blocks.h"
 
 namespace kinespace {
+namespace {
+
+constexpr double low_toe_cm = 2.5;
+constexpr double low_ankle_cm = 4;
+constexpr double slow_cm_s = 20;
+constexpr double falling_cm_s = 20;
+
+// How high each joint of a foot is over where it stands; infinite for one that is not there.
+std::array<double, 4> heights_over_stand(const FootTracks& tracks, const FootLevel& level, int frame) {
+  std::array<double, 4> out{};
+  for (int slot = 0; slot < 4; ++slot) {
+    out[slot] = std::numeric_limits<double>::infinity();
+    if (!tracks.has(slot)) continue;
+    const Eigen::Vector3d& p = tracks.at[slot][frame];
+    out[slot] = p.y() - level.ground.at(p) - level.standing_cm[slot];
+  }
+  return out;
+}
+
+double ground_speed(const FootTracks& tracks, int slot, int frame) {
+  const Eigen::Vector3d step = tracks.at[slot][frame + 1] - tracks.at[slot][frame];
+  return std::hypot(step.x(), step.z()) * tracks.rate_hz;
+}
+
+struct Mean {
+  double sum = 0;
+  std::int64_t count = 0;
+  void add(double value) {
+    sum += value;
+    ++count;
+  }
+  [[nodiscard]] std::optional<double> value() const {
+    return count == 0 ? std::nullopt : std::optional(sum / static_cast<double>(count));
+  }
+};
+
+}  // namespace
+
+FootLevel foot_level(const FootTracks& tracks) {
+  FootLevel out{.ground = estimate_ground(tracks)};
+  out.standing_cm = standing_heights(tracks, out.ground);
+  return out;
+}
+
+FootMotion foot_motion(const FootTracks& tracks, const FootLevel& level) {
+  return foot_motion(tracks, level, 0, tracks.frames - 1);
+}
+
+FootMotion foot_motion(const FootTracks& tracks, const FootLevel& level, int first, int last) {
+  assert(first >= 0 && last < tracks.frames);
+  FootMotion out;
+  Mean slide;
+  Mean lowest_speed;
+  Mean hover;
+  std::array<double, 4> now = heights_over_stand(tracks, level, first);
+  for (int f = first; f <= last; ++f) {
+    const auto lowest = std::ranges::min_element(now);
+    for (int slot = 0; slot < 4; ++slot) {
+      if (!tracks.has(slot)) continue;
+      const Eigen::Vector3d& p = tracks.at[slot][f];
+      out.penetration_cm = std::max(out.penetration_cm, level.ground.at(p) - p.y());
+    }
+    if (f == last) break;
+    lowest_speed.add(ground_speed(tracks, static_cast<int>(lowest - now.begin()), f));
+    const double rise = (tracks.root[f + 1] - tracks.root[f]).y() * tracks.rate_hz;
+    if (rise > -falling_cm_s) hover.add(std::max(0.0, *lowest));
+    const std::array<double, 4> next = heights_over_stand(tracks, level, f + 1);
+    for (int slot = 0; slot < 4; ++slot) {
+      const double low = slot % 2 == 0 && tracks.has(slot + 1) ? low_ankle_cm : low_toe_cm;
+      if (!tracks.has(slot) || std::max(now[slot], next[slot]) > low) continue;
+      const double speed = ground_speed(tracks, slot, f);
+      if (speed < slow_cm_s) slide.add(speed);
+    }
+    now = next;
+  }
+  out.slide_cm_s = slide.value();
+  out.lowest_speed_cm_s = lowest_speed.value();
+  out.hover_cm = hover.value().value_or(0);
+  return out;
+}
 
 std::optional<double> foot_slide_cm_s(const FootTracks& tracks, const FootContacts& contacts) {
   double sum = 0;

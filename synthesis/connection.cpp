@@ -311,14 +311,14 @@ std::vector<ConnectionSpace::Minimum> ConnectionSpace::minima_of_table(const Pai
 }
 
 std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first, const ConnectionMotion& second,
-                                                   double shortest_s, double give_up_cm) const {
-  const LegalRange range{&first, &second, shortest_s > 0 ? shortest_s : options_.shortest_s};
+                                                   double shortest_s, const Limits& limits) const {
+  const LegalRange range{&first, &second, shortest_s > 0 ? shortest_s : options_.shortest_s, limits.largest_speed};
   const PairCost cost(*curves_, first, second);
   const std::vector<Minimum> minima = minima_of_table(cost, range);
   if (minima.empty()) return std::nullopt;
   constexpr double worth_looking = 1.4;
   const double least = minima.front().cost;
-  if (std::isfinite(least) && 100 * std::sqrt(std::max(least, 0.0)) > worth_looking * give_up_cm) return std::nullopt;
+  if (std::isfinite(least) && 100 * std::sqrt(std::max(least, 0.0)) > worth_looking * limits.give_up_cm) return std::nullopt;
 
   RefinedConnection best;
   int evaluations = 0;

@@ -89,12 +89,19 @@ class ConnectionSpace {
   // Whether the clip is long enough to be left or entered.
   [[nodiscard]] bool long_enough(double duration_s) const { return duration_s / 2 >= options_.shortest_s; }
 
+  struct Limits {
+    // Costs above are of no interest: no connection when the grid has nothing within 1.4 times of that.
+    double give_up_cm = std::numeric_limits<double>::infinity();
+    double largest_speed = 2;  // 1 to 2: motion 1 is played at most so much faster or slower than motion 2
+  };
   // The best connection over the whole legal range, in which the overlap lasts `shortest_s` (that of the options when
-  // 0) or longer; none when there is no legal (u, v). Costs above `give_up_cm` are of no interest: none as well when
-  // the grid has nothing within 1.4 times of that.
+  // 0) or longer; none when there is no legal (u, v).
   [[nodiscard]] std::optional<Connection> connect(const ConnectionMotion& first, const ConnectionMotion& second,
-                                                  double shortest_s = 0,
-                                                  double give_up_cm = std::numeric_limits<double>::infinity()) const;
+                                                  double shortest_s, const Limits& limits) const;
+  [[nodiscard]] std::optional<Connection> connect(const ConnectionMotion& first, const ConnectionMotion& second,
+                                                  double shortest_s = 0) const {
+    return connect(first, second, shortest_s, Limits{});
+  }
 
   // E(u, v) of eq. 15, in square metres, for one (u, v); infinity where it is not legal.
   [[nodiscard]] double cost(const ConnectionMotion& first, const ConnectionMotion& second, double u, double v,

@@ -4,155 +4,29 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <optional>
+#include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "kinespace/base/error.h"
+#include "kinespace/footskate/contact_model.h"
+#include "kinespace/footskate/kept_feet.h"
 #include "kinespace/motion/kinematics.h"
 #include "kinespace/synthesis/curve_sampler.h"
+#include "kinespace/synthesis/detail/footsteps.h"
+#include "kinespace/synthesis/detail/joined_pair.h"
 #include "kinespace/synthesis/detail/side_track_blend.h"
 
 namespace kinespace {
 namespace {
-
-constexpr int clock_points = 257;
-
-// 0 to 1 with first and second derivative 0 at both ends.
-double smooth_step(double x) {
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * x * (x * (6 * x - 15) + 10);
-}
-
-// The second motion's time within an overlap, by the output's clock: its speed goes from 1 / u to 1, times what slows
-// the whole down in the middle.
-class OverlapClock {
- public:
-  // The overlap lasts exactly `duration_s`.
-  OverlapClock(const Connection& connection, double duration_s)
-      : connection_(connection), duration_s_(duration_s), second_s_(clock_points) {
-    const double length = connection.entered_s - connection.enter_s;
-    const double slow = 2 * (length / duration_s - plain_mean(connection));  // the bump's mean is 1/2
-    const double step = duration_s / (clock_points - 1);
-    const auto speed = [&](double x) {
-      const double bump = std::sin(std::numbers::pi * x);
-      return plain_speed(connection, x) + slow * bump * bump;
-    };
-    double time = connection.enter_s;
-    for (int i = 0; i < clock_points; ++i) {
-      second_s_[static_cast<std::size_t>(i)] = time;
-      const double x = static_cast<double>(i) / (clock_points - 1);
-      const double half = 0.5 / (clock_points - 1);
-      time += step * (speed(x) + 4 * speed(x + half) + speed(x + 2 * half)) / 6;
-    }
-  }
-
-  // How long the overlap lasts when nothing slows it down.
-  [[nodiscard]] static double plain_duration(const Connection& connection) {
-    return (connection.entered_s - connection.enter_s) / plain_mean(connection);
-  }
-
-  [[nodiscard]] double second_s(double overlap_s) const {
-    const double at = std::clamp(overlap_s / duration_s_, 0.0, 1.0) * (clock_points - 1);
-    const auto i = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(clock_points - 2));
-    const double b = at - static_cast<double>(i);
-    return (1 - b) * second_s_[i] + b * second_s_[i + 1];
-  }
-  [[nodiscard]] double first_s(double overlap_s) const {
-    return connection_.leave_s + connection_.speed() * (second_s(overlap_s) - connection_.enter_s);
-  }
-
- private:
-  static double plain_speed(const Connection& connection, double x) {
-    return std::pow(connection.speed(), smooth_step(x) - 1);
-  }
-  static double plain_mean(const Connection& connection) {
-    double sum = 0;
-    for (int i = 0; i < clock_points - 1; ++i) sum += plain_speed(connection, (i + 0.5) / (clock_points - 1));
-    return sum / (clock_points - 1);
-  }
-
-  Connection connection_;
-  double duration_s_;
-  std::vector<double> second_s_;
-};
 
 ClipCurves poses_at(const CurveSampler& sampler, std::span<const double> times) {
   ClipCurves out{.rate_hz = 1, .values = SampleMatrix(static_cast<Eigen::Index>(times.size()), sampler.curves())};
   for (std::size_t i = 0; i < times.size(); ++i) sampler.at(times[i], out.values.row(static_cast<Eigen::Index>(i)));
   return out;
 }
-
-// `pose` becomes the blend of itself (weight 1 - w) and of `other`.
-void blend_pose(Eigen::RowVectorXd& pose, const Eigen::RowVectorXd& other, const Eigen::RowVectorXd& signs, double w) {
-  pose.head<travel_curves>() = (1 - w) * pose.head<travel_curves>() + w * other.head<travel_curves>();
-  for (Eigen::Index c = travel_curves; c + 3 < pose.size(); c += 4) {
-    const Eigen::Vector4d a = pose.segment<4>(c).transpose();
-    const Eigen::Vector4d b = other.segment<4>(c).transpose() * signs((c - travel_curves) / 4);
-    const double angle = std::acos(std::clamp(a.dot(b), -1.0, 1.0));
-    const double sine = std::sin(angle);
-    Eigen::Vector4d q = sine < 1e-6 ? Eigen::Vector4d((1 - w) * a + w * b)
-                                    : Eigen::Vector4d((std::sin((1 - w) * angle) * a + std::sin(w * angle) * b) / sine);
-    pose.segment<4>(c) = q.normalized().transpose();
-  }
-}
-
-// Two motions, joined: poses by the time since the overlap began.
-class JoinedPair {
- public:
-  JoinedPair(const CurveSampler& first, const CurveSampler& second, const Join& join)
-      : first_(first), second_(second), join_(join), clock_(join.connection, join.duration_s), other_(second.curves()) {
-    constexpr int looks = 9;
-    signs_.setZero((first.curves() - travel_curves) / 4);
-    Eigen::RowVectorXd pose(first.curves());
-    for (int i = 0; i < looks; ++i) {
-      const double overlap_s = join.duration_s * i / (looks - 1);
-      first_.at(clock_.first_s(overlap_s), pose);
-      second_at(clock_.second_s(overlap_s), other_);
-      for (Eigen::Index k = 0; k < signs_.size(); ++k) {
-        signs_(k) += pose.segment<4>(travel_curves + 4 * k).dot(other_.segment<4>(travel_curves + 4 * k));
-      }
-    }
-    for (double& sign : signs_) sign = sign < 0 ? -1 : 1;
-  }
-
-  // The second motion's share and both motions' times.
-  struct Shares {
-    double second = 0;
-    double first_s = 0, second_s = 0;
-  };
-  Shares at(double overlap_s, Eigen::RowVectorXd& pose) {
-    if (overlap_s >= join_.duration_s) {
-      const double second_s = join_.connection.entered_s + overlap_s - join_.duration_s;
-      second_at(second_s, pose);
-      return {1, join_.connection.left_s, second_s};
-    }
-    if (overlap_s <= 0) {
-      const double first_s = join_.connection.leave_s + overlap_s;
-      first_.at(first_s, pose);
-      return {0, first_s, join_.connection.enter_s};
-    }
-    const Shares shares{smooth_step(overlap_s / join_.duration_s), clock_.first_s(overlap_s),
-                        clock_.second_s(overlap_s)};
-    first_.at(shares.first_s, pose);
-    second_at(shares.second_s, other_);
-    blend_pose(pose, other_, signs_, shares.second);
-    return shares;
-  }
-
- private:
-  void second_at(double time_s, Eigen::RowVectorXd& pose) const {
-    second_.at(time_s, pose);
-    join_.placement.apply(pose);
-  }
-
-  const CurveSampler& first_;
-  const CurveSampler& second_;
-  Join join_;
-  OverlapClock clock_;
-  Eigen::RowVectorXd other_, signs_;
-};
 
 // Heights are of the world: clips keep theirs where they are joined.
 ClipCurves at_world_height(ClipCurves curves) {
@@ -163,97 +37,269 @@ ClipCurves at_world_height(ClipCurves curves) {
 
 // What is asked of the sources again and again.
 struct Source {
-  explicit Source(const ClipCurves& curves, const Skeleton& skeleton)
-      : sampler(at_world_height(curves)), rates(joint_rates(clip_from_curves(curves, skeleton))) {}
+  Source(const ClipCurves& curves, const Skeleton& skeleton, const std::optional<FootContacts>& known, bool plan_feet)
+      : sampler(at_world_height(curves)) {
+    const Clip clip = clip_from_curves(curves, skeleton);
+    rates = joint_rates(clip);
+    feet = find_feet(clip);
+    if (!feet) return;
+    const FootTracks tracks = foot_tracks(clip, *feet);
+    level = foot_level(tracks);
+    motion = foot_motion(tracks, level);
+    contacts_known = plan_feet && clip.rate_hz >= least_contact_rate_hz;
+    if (!contacts_known) return;
+    const FootContacts contacts = known ? *known : ContactModel::standard().detect(tracks, level.ground);
+    for (int leg = 0; leg < 2; ++leg) {
+      stands[leg] = planted_frames(contacts, 2 * leg, clip.frames);
+      const auto toe = planted_frames(contacts, 2 * leg + 1, clip.frames);
+      for (int f = 0; f < clip.frames; ++f) stands[leg][f] = static_cast<char>(stands[leg][f] | toe[f]);
+    }
+  }
+
+  [[nodiscard]] bool stands_at(int leg, double time_s) const {
+    const auto frame = std::llround(time_s * sampler.rate_hz());
+    return stands[leg][std::clamp<std::ptrdiff_t>(frame, 0, std::ssize(stands[leg]) - 1)] != 0;
+  }
+
   CurveSampler sampler;
   JointRates rates;
+  std::optional<Feet> feet;
+  FootLevel level;
+  FootMotion motion;
+  bool contacts_known = false;
+  std::array<std::vector<char>, 2> stands;  // by leg, whether ankle or toe stands
 };
 
-// How far the lowest joint of frames [begin, end) is below the lowest of the others: poses between two others may put a
-// foot through the ground.
-double sink_of(const JointPositions& positions, int begin, int end) {
-  double inside = std::numeric_limits<double>::infinity();
-  double around = inside;
-  for (int f = 0; f < positions.frames; ++f) {
-    double& lowest = f >= begin && f < end ? inside : around;
-    for (int j = 0; j < positions.joints; ++j) lowest = std::min(lowest, positions.at(f, j).y());
+// How many frames before and after an overlap may change so that the feet stay where they are.
+struct Margins {
+  int before = 0, after = 0;
+};
+
+// Joins two motions and measures what comes out.
+class Joiner {
+ public:
+  Joiner(const Source& first, const Source& second, const Skeleton& skeleton, double least_leave_s,
+         double largest_entered_s)
+      : first_(first),
+        second_(second),
+        skeleton_(skeleton),
+        least_leave_s_(least_leave_s),
+        largest_entered_s_(largest_entered_s) {}
+
+  // Output frames around an overlap that began `phase_s` before the first of them that is inside.
+  struct Seam {
+    ClipCurves curves;
+    int begin = 0, end = 0;  // the overlap's frames
+    std::optional<FootTracks> tracks;
+    bool feet_planned = false;
+  };
+
+  [[nodiscard]] Seam seam_of(const Join& join, double phase_s, bool plan_feet) const {
+    const double rate = first_.sampler.rate_hz();
+    const Margins margins = margins_of(join);
+    Seam out{.begin = margins.before};
+    out.end = out.begin + static_cast<int>(std::floor((join.duration_s - phase_s) * rate + 1e-9)) + 1;
+    const int frames = out.end + margins.after;
+    JoinedPair pair(first_.sampler, second_.sampler, join);
+    out.curves = empty_curves(frames);
+    Eigen::RowVectorXd pose(first_.sampler.curves());
+    std::vector<JoinedPair::Shares> shares;
+    for (int f = 0; f < frames; ++f) {
+      shares.push_back(pair.at(phase_s + (f - out.begin) / rate, pose));
+      out.curves.values.row(f) = pose;
+    }
+    if (!first_.feet) return out;
+    Clip clip = clip_from_curves(out.curves, skeleton_);
+    out.tracks = foot_tracks(clip, *first_.feet);
+    if (!plan_feet || !first_.contacts_known || !second_.contacts_known) return out;
+    const SeamFeet feet = feet_over(pair, shares, out, rate);
+    const Footsteps plan = plan_footsteps(feet);
+    take_footsteps(clip, *out.tracks, first_.level.ground, feet, plan);
+    out.feet_planned = put_legs(clip, out.curves);
+    if (out.feet_planned) out.tracks = foot_tracks(clip, *first_.feet);
+    return out;
   }
-  return std::isfinite(inside) ? std::max(0.0, around - inside) : 0;
+
+  [[nodiscard]] Join measured(Join join, bool plan_feet) const {
+    const double step = 1 / first_.sampler.rate_hz();
+    // The output's frames are those of the first motion, so the overlap begins between two of them.
+    const double phase = std::ceil(join.connection.leave_s / step - 1e-9) * step - join.connection.leave_s;
+    const Seam seam = seam_of(join, phase, plan_feet);
+    const std::array<const JointRates*, 2> sources{&first_.rates, &second_.rates};
+    const double begin_s = seam.begin * step - phase;
+    const Clip clip = clip_from_curves(seam.curves, skeleton_);
+    join.ratios = seam_ratios(joint_rates(clip), begin_s, begin_s + join.duration_s, usual_rates(sources));
+    join.feet_planned = seam.feet_planned;
+    if (seam.tracks) {
+      join.feet = foot_motion(*seam.tracks, first_.level, seam.begin, seam.end - 1);
+      join.feet_of_sources = mean_motion(first_.motion, second_.motion);
+    }
+    return join;
+  }
+
+ private:
+  // Room for the root and the feet to come back to the motions themselves; no seam reaches into its neighbour's.
+  [[nodiscard]] Margins margins_of(const Join& join) const {
+    constexpr double around_s = 1.5;
+    const double rate = first_.sampler.rate_hz();
+    const double before = std::clamp(join.connection.leave_s - least_leave_s_, 0.0, around_s);
+    const double after = std::clamp(largest_entered_s_ - join.connection.entered_s, 0.0, around_s);
+    return {static_cast<int>(before * rate), static_cast<int>(after * rate)};
+  }
+
+  [[nodiscard]] ClipCurves empty_curves(int frames) const {
+    return {.rate_hz = first_.sampler.rate_hz(), .values = SampleMatrix(frames, first_.sampler.curves())};
+  }
+
+  [[nodiscard]] SeamFeet feet_over(const JoinedPair& pair, const std::vector<JoinedPair::Shares>& shares,
+                                   const Seam& seam, double rate_hz) const {
+    SeamFeet out{.frames = seam.curves.frames(), .begin = seam.begin, .end = seam.end, .rate_hz = rate_hz};
+    ClipCurves first = empty_curves(out.frames), second = empty_curves(out.frames);
+    Eigen::RowVectorXd pose(first.values.cols());
+    for (int f = 0; f < out.frames; ++f) {
+      pair.first_at(shares[f].first_s, pose);
+      first.values.row(f) = pose;
+      pair.second_at(shares[f].second_s, pose);
+      second.values.row(f) = pose;
+    }
+    out.first.ankles = ankles_of(clip_from_curves(first, skeleton_), *first_.feet);
+    out.second.ankles = ankles_of(clip_from_curves(second, skeleton_), *first_.feet);
+    for (int leg = 0; leg < 2; ++leg) {
+      for (int f = 0; f < out.frames; ++f) {
+        out.first.stands[leg].push_back(first_.stands_at(leg, shares[f].first_s) ? 1 : 0);
+        out.second.stands[leg].push_back(f >= seam.begin && second_.stands_at(leg, shares[f].second_s) ? 1 : 0);
+      }
+    }
+    return out;
+  }
+
+  // What the clip's legs and root are, into the curves; false where the curves have no such joint.
+  [[nodiscard]] bool put_legs(const Clip& clip, ClipCurves& curves) const {
+    const std::vector<int> rotating = skeleton_.rotating_joints();
+    std::vector<std::pair<int, Eigen::Index>> columns;
+    for (const Leg& leg : first_.feet->legs) {
+      for (const int joint : {leg.hip, leg.knee, leg.ankle}) {
+        const auto found = std::ranges::find(rotating, joint);
+        if (found == rotating.end()) return false;
+        columns.emplace_back(joint, travel_curves + 4 * (found - rotating.begin()));
+      }
+    }
+    const int root = skeleton_.travel_root();
+    for (int f = 0; f < clip.frames; ++f) {
+      for (const auto& [joint, column] : columns) {
+        const Eigen::Quaterniond q = clip.rotation(joint, f);
+        curves.values.row(f).segment<4>(column) << q.w(), q.x(), q.y(), q.z();
+      }
+      curves.values.row(f).head<travel_curves>() = clip.translation(root, f).transpose() / 100;
+    }
+    return true;
+  }
+
+  static FootMotion mean_motion(const FootMotion& a, const FootMotion& b) {
+    const auto mean = [](const std::optional<double>& x, const std::optional<double>& y) -> std::optional<double> {
+      if (!x || !y) return x ? x : y;
+      return (*x + *y) / 2;
+    };
+    return {.slide_cm_s = mean(a.slide_cm_s, b.slide_cm_s),
+            .lowest_speed_cm_s = mean(a.lowest_speed_cm_s, b.lowest_speed_cm_s),
+            .penetration_cm = std::max(a.penetration_cm, b.penetration_cm),
+            .hover_cm = (a.hover_cm + b.hover_cm) / 2};
+  }
+
+  const Source& first_;
+  const Source& second_;
+  const Skeleton& skeleton_;
+  double least_leave_s_;       // from there on the first motion may change
+  double largest_entered_s_;   // up to there the second
+};
+
+// How much worse a joined motion is than its sources: 0 where nothing can be seen.
+double badness(const Join& join) {
+  const auto over = [](double ratio, double allowed) { return std::max(0.0, ratio - allowed); };
+  double out = 3 * over(join.ratios.speed, 1) + 3 * over(join.ratios.acceleration, 1) +
+               over(join.ratios.root_acceleration, 1);
+  out += 0.2 * (join.ratios.worst() + join.ratios.root_acceleration);
+  if (join.feet) {
+    const FootMotion& feet = *join.feet;
+    const FootMotion& usual = *join.feet_of_sources;
+    constexpr double seen_cm_s = 2;  // slower than this nobody sees
+    const double slide = feet.slide_cm_s.value_or(0) / std::max(seen_cm_s, usual.slide_cm_s.value_or(0));
+    const double lowest = feet.lowest_speed_cm_s.value_or(0) / std::max(seen_cm_s, usual.lowest_speed_cm_s.value_or(0));
+    out += 0.5 * slide + over(slide, 1.2) + 0.2 * lowest + 0.3 * over(lowest, 1.2);
+    out += over(feet.penetration_cm - usual.penetration_cm, 1) / 3;
+  }
+  return out + 0.3 * std::abs(std::log2(join.connection.speed())) + join.connection.cost_cm / 50 +
+         0.3 * (join.stretch - 1);
 }
 
-// The seam of a join, from 0.25 s before the overlap to 0.25 s after it, at the first motion's rate.
-void measure_seam(const Source& first, const Source& second, const Skeleton& skeleton, Join& join) {
-  constexpr double around_s = 0.25;
-  const double step = 1 / first.sampler.rate_hz();
-  const int before = static_cast<int>(std::ceil(around_s / step)) + 1;
-  const int after = static_cast<int>(std::ceil((join.duration_s + around_s) / step)) + 1;
-  JoinedPair pair(first.sampler, second.sampler, join);
-  ClipCurves curves{.rate_hz = first.sampler.rate_hz(),
-                    .values = SampleMatrix(before + after + 1, first.sampler.curves())};
-  Eigen::RowVectorXd pose(first.sampler.curves());
-  // The output's frames are those of the first motion, so the overlap begins between two of them.
-  const double phase = std::ceil(join.connection.leave_s / step) * step - join.connection.leave_s;
-  for (int i = -before; i <= after; ++i) {
-    pair.at(phase + i * step, pose);
-    curves.values.row(i + before) = pose;
+GroundMotion placed(const Connection& connection, const OverlapClock& clock, double duration_s, const Source& first,
+                    const Source& second, const Skeleton& skeleton) {
+  constexpr int looks = 12;
+  std::array<double, looks> first_s{}, second_s{};
+  for (int i = 0; i < looks; ++i) {
+    const double overlap_s = duration_s * (i + 0.5) / looks;
+    first_s[static_cast<std::size_t>(i)] = clock.first_s(overlap_s);
+    second_s[static_cast<std::size_t>(i)] = clock.second_s(overlap_s);
   }
-  const std::array<const JointRates*, 2> sources{&first.rates, &second.rates};
-  const double begin_s = before * step - phase;
-  const Clip seam = clip_from_curves(curves, skeleton);
-  join.ratios = seam_ratios(joint_rates(seam), begin_s, begin_s + join.duration_s, usual_rates(sources));
-  join.sink_cm = sink_of(joint_positions(seam), static_cast<int>(std::ceil(begin_s / step)),
-                         static_cast<int>(std::floor((begin_s + join.duration_s) / step)) + 1);
+  static_cast<void>(connection);
+  return ground_alignment(first.sampler, first_s, second.sampler, second_s, skeleton);
 }
 
-Join join_by(const Connection& connection, const Source& first, const Source& second, double stretch,
-             const Skeleton& skeleton) {
+Join blended_join(const Connection& connection, const Source& first, const Source& second, double stretch,
+                  const Skeleton& skeleton) {
   // The second motion's frames shall be frames of the output where both have one rate: the overlap's length gives way.
   const double step = 1 / first.sampler.rate_hz();
   const double wanted = stretch * OverlapClock::plain_duration(connection);
   const double steps = std::round((connection.leave_s + wanted - connection.entered_s) / step);
   const double duration = steps * step + connection.entered_s - connection.leave_s;
   Join join{.connection = connection, .duration_s = duration > step ? duration : duration + step, .stretch = stretch};
-
-  constexpr int looks = 12;
-  const OverlapClock clock(connection, join.duration_s);
-  std::array<double, looks> first_s{}, second_s{};
-  for (int i = 0; i < looks; ++i) {
-    const double overlap_s = join.duration_s * (i + 0.5) / looks;
-    first_s[static_cast<std::size_t>(i)] = clock.first_s(overlap_s);
-    second_s[static_cast<std::size_t>(i)] = clock.second_s(overlap_s);
-  }
-  join.placement = ground_alignment(first.sampler, first_s, second.sampler, second_s, skeleton);
-  measure_seam(first, second, skeleton, join);
+  join.placement =
+      placed(connection, OverlapClock(connection, join.duration_s), join.duration_s, first, second, skeleton);
   return join;
 }
 
-std::optional<Join> smoothest_join(const ConnectionSpace& space, const ConnectionMotion& end,
-                                   const ConnectionMotion& start, const Source& first, const Source& second,
-                                   const Skeleton& skeleton, const TransitionOptions& options) {
+// From the middle of a connection on the second motion, after `duration_s` as it is; nullopt where it is too short.
+std::optional<Join> inertialized_join(const Connection& connection, const Source& first, const Source& second,
+                                      double duration_s, const Skeleton& skeleton) {
+  const double step = 1 / first.sampler.rate_hz();
+  const double leave = std::floor((connection.leave_s + connection.left_s) / 2 / step) * step;
+  const double ahead = std::round((connection.enter_s + connection.entered_s) / 2 / step) * step;
+  const double duration = std::max(1.0, std::round(duration_s / step)) * step;
+  if (ahead + duration > second.sampler.duration_s() / 2 + 1e-9 || leave <= 0) return std::nullopt;
+  Join join{.connection = connection, .way = JoinWay::inertialization, .duration_s = duration};
+  join.connection.leave_s = leave;
+  join.connection.left_s = leave + duration;
+  join.connection.enter_s = ahead;
+  join.connection.entered_s = ahead + duration;
+  const std::array<double, 1> at_first{leave}, at_second{ahead};
+  join.placement = ground_alignment(first.sampler, at_first, second.sampler, at_second, skeleton);
+  return join;
+}
+
+std::optional<Join> best_join(const ConnectionSpace& space, const ConnectionMotion& end, const ConnectionMotion& start,
+                              const Source& first, const Source& second, const Skeleton& skeleton, const Joiner& joiner,
+                              const TransitionOptions& options) {
   std::optional<Join> best;
-  // A seam that cannot be seen comes first, then feet above the ground.
-  const auto smooth = [&](const Join& join) { return join.ratios.worst() <= options.largest_ratio; };
-  const auto better = [&](const Join& a, const Join& b) {
-    if (smooth(a) != smooth(b)) return smooth(a);
-    return smooth(a) ? a.sink_cm < b.sink_cm : a.ratios.worst() < b.ratios.worst();
+  double least = std::numeric_limits<double>::infinity();
+  const auto consider = [&](const Join& plain) {
+    const Join join = joiner.measured(plain, options.plan_feet);
+    const double bad = badness(join);
+    if (bad < least) std::tie(best, least) = std::pair(join, bad);
   };
-  const auto consider = [&](const Connection& connection, double stretch) {
-    Join join = join_by(connection, first, second, stretch, skeleton);
-    if (!best || better(join, *best)) best = join;
-    return options.fixed || (smooth(*best) && best->sink_cm <= options.largest_sink_cm);
-  };
-  std::vector<Connection> connections;
   const double window = std::min(end.length_s, start.length_s);
   for (const double shortest : {space.options().shortest_s, 0.5, 0.8, 1.2, 1.6, window}) {
     if (shortest < space.options().shortest_s || shortest > window) continue;
-    const auto connection = space.connect(end, start, shortest);
+    auto connection = space.connect(end, start, shortest, {.largest_speed = options.largest_speed});
+    if (!connection) connection = space.connect(end, start, shortest);
     if (!connection) continue;
-    connections.push_back(*connection);
-    if (consider(*connection, 1)) return best;
-  }
-  for (const double stretch : {1.4, 2.0}) {
-    for (const Connection& connection : connections) {
-      if (consider(connection, stretch)) return best;
+    if (options.way != JoinWay::inertialization) {
+      for (const double stretch : {1.0, 1.25}) consider(blended_join(*connection, first, second, stretch, skeleton));
+    }
+    if (options.way != JoinWay::blend) {
+      for (const double duration : {0.3, 0.5, 0.8}) {
+        const auto join = inertialized_join(*connection, first, second, duration, skeleton);
+        if (join) consider(*join);
+      }
     }
   }
   return best;
@@ -277,14 +323,14 @@ GroundMotion compose(const GroundMotion& outer, const GroundMotion& inner) {
 
 }  // namespace
 
+std::string_view to_string(JoinWay way) {
+  return way == JoinWay::blend ? "blend" : "inertialization";
+}
+
 void TransitionOptions::validate() const {
-  if (!(largest_ratio > 0)) {
-    throw Error(ErrorKind::usage, {.found = fmt::format("largest_ratio = {}", largest_ratio), .expected = "above 0"});
-  }
-  if (!(largest_sink_cm > 0)) {
-    throw Error(ErrorKind::usage,
-                {.found = fmt::format("largest_sink_cm = {}", largest_sink_cm), .expected = "above 0"});
-  }
+  if (largest_speed >= 1 && largest_speed <= 2) return;
+  throw Error(ErrorKind::usage,
+              {.found = fmt::format("largest_speed = {}", largest_speed), .expected = "1 to 2", .remedy = {}});
 }
 
 GroundMotion ground_alignment(const CurveSampler& first, std::span<const double> first_s, const CurveSampler& second,
@@ -312,20 +358,30 @@ GroundMotion ground_alignment(const CurveSampler& first, std::span<const double>
 }
 
 Transition make_transition(const ConnectionSpace& space, std::span<const ClipCurves> clips, const Skeleton& skeleton,
-                           const TransitionOptions& options) {
+                           const TransitionOptions& options,
+                           std::span<const std::optional<FootContacts>> contacts) {
   options.validate();
   if (clips.size() < 2) {
     throw Error(ErrorKind::usage, {.found = fmt::format("{} clip", clips.size()), .expected = "two clips or more"});
   }
   std::vector<Source> sources;
-  for (const ClipCurves& clip : clips) sources.emplace_back(clip, skeleton);
+  sources.reserve(clips.size());
+  for (std::size_t i = 0; i < clips.size(); ++i) {
+    sources.emplace_back(clips[i], skeleton, i < contacts.size() ? contacts[i] : std::nullopt, options.plan_feet);
+  }
+  // A motion is entered in its first half and left in its second.
+  const auto joiner_at = [&](std::size_t i) {
+    const double half = sources[i + 1].sampler.duration_s() / 2;
+    return Joiner(sources[i], sources[i + 1], skeleton, i == 0 ? 0 : sources[i].sampler.duration_s() / 2,
+                  i + 2 == clips.size() ? 2 * half : half);
+  };
 
   Transition out;
   std::vector<double> offsets{0};  // the output's time less each motion's own
   std::vector<GroundMotion> placements{{}};
   for (std::size_t i = 0; i + 1 < clips.size(); ++i) {
-    auto join = smoothest_join(space, space.end_of(clips[i]), space.start_of(clips[i + 1]), sources[i], sources[i + 1],
-                               skeleton, options);
+    auto join = best_join(space, space.end_of(clips[i]), space.start_of(clips[i + 1]), sources[i], sources[i + 1],
+                          skeleton, joiner_at(i), options);
     if (!join) {
       throw Error(ErrorKind::bad_input, {.found = fmt::format("no way from {} to {} within the legal speeds",
                                                               clips[i].name, clips[i + 1].name),
@@ -370,6 +426,18 @@ Transition make_transition(const ConnectionSpace& space, std::span<const ClipCur
     }
     placements[at].apply(pose);
     curves.values.row(f) = pose;
+  }
+  for (std::size_t i = 0; i < out.joins.size(); ++i) {
+    if (!out.joins[i].feet_planned) continue;
+    const int first_inside = static_cast<int>(std::ceil(out.begin[i] * rate - rounding));
+    const auto seam = joiner_at(i).seam_of(out.joins[i], first_inside / rate - out.begin[i], true);
+    for (int f = 0; f < seam.curves.frames(); ++f) {
+      const int to = first_inside + f - seam.begin;
+      if (to < 0 || to >= frames) continue;
+      pose = seam.curves.values.row(f);
+      placements[i].apply(pose);
+      curves.values.row(to) = pose;
+    }
   }
   keep_sides(curves.values);
   curves.side_tracks = blend_side_tracks(clips, parts, skeleton);

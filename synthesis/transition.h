@@ -7,15 +7,28 @@
 // blended with a weight that is twice continuously differentiable: joints on the shortest arc, the root's position
 // straight.
 //
-// How long the overlap lasts: the shortest for which the joints move neither faster nor more suddenly than in the
-// motions themselves (seam.h), among the best connections of at least 0.3, 0.5, 0.8, 1.2 and 1.6 s and of the whole
-// window, if need be played slower; when none is that smooth, the smoothest.
+// Or, where that is better, the second motion is played from the seam on and what the first differed from it dies away
+// (inertialization: Bollo 2018, "Inertialization: High-Performance Animation Transitions in Gears of War").
+//
+// Feet: which foot stands when and where is planned over the overlap from what both motions' feet do
+// (detail/footsteps.h): one that stands in both keeps its place where places are near, else it makes a step; the legs
+// and the root follow the feet.
+//
+// Which join: of those that eq. 15 gives with overlaps of at least 0.3, 0.5, 0.8, 1.2 and 1.6 s and the whole window, at
+// near the motions' own speeds, joined in both ways, the one whose result is best as measured: how much faster and more
+// suddenly joints and root move than in the motions themselves (seam.h), how much more feet slide
+// (footskate/skate_measures.h), how deep they go, and how far from their own speed the motions are played.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "kinespace/footskate/contacts.h"
+#include "kinespace/footskate/skate_measures.h"
 #include "kinespace/motion/clip.h"
 #include "kinespace/motion/curves.h"
 #include "kinespace/synthesis/connection.h"
@@ -23,10 +36,15 @@
 
 namespace kinespace {
 
+enum class JoinWay : std::uint8_t { blend, inertialization };
+
+// "blend", "inertialization".
+[[nodiscard]] std::string_view to_string(JoinWay way);
+
 struct TransitionOptions {
-  double largest_ratio = 1.01;  // > 0; a seam this smooth is not made longer for more ...
-  double largest_sink_cm = 3;   // > 0; ... where no joint goes deeper than this below those of both motions around it
-  bool fixed = false;           // take the best connection of eq. 15 whatever its seam
+  double largest_speed = 1.25;  // 1 to 2: one motion is played at most so much faster than the other in the overlap
+  bool plan_feet = true;        // where the skeleton has feet
+  std::optional<JoinWay> way;   // this one only
 
   // Throws Error{usage} naming field, value and legal range.
   void validate() const;
@@ -35,11 +53,14 @@ struct TransitionOptions {
 // How two motions are joined.
 struct Join {
   Connection connection;
+  JoinWay way = JoinWay::blend;
   GroundMotion placement;  // of the second, from its own frame (ClipCurves) into the first's
   double duration_s = 0;   // of the overlap, by the output's clock
   double stretch = 1;      // the overlap is played so much slower than the motions alone would have it
   SeamRatios ratios;
-  double sink_cm = 0;  // how far the lowest joint in the overlap is below the lowest of 0.25 s before and after it
+  // Feet over the overlap, and over both motions alone (the mean); nullopt where no legs can be told.
+  std::optional<FootMotion> feet, feet_of_sources;
+  bool feet_planned = false;
 };
 
 struct Transition {
@@ -54,9 +75,11 @@ struct Transition {
                                             const CurveSampler& second, std::span<const double> second_s,
                                             const Skeleton& skeleton);
 
-// Joins clips in their order. Curves must be on the space's side (LibraryView gives them so). Throws Error{usage} for
+// Joins clips in their order. Curves must be on the space's side (LibraryView gives them so). `contacts` are when the feet
+// of each clip stand, where that is known (KeptFeet::frames); else they are found (footskate/contact_model.h). Throws Error{usage} for
 // fewer than two clips and Error{bad_input} naming a clip that is too short to be left or entered.
 [[nodiscard]] Transition make_transition(const ConnectionSpace& space, std::span<const ClipCurves> clips,
-                                         const Skeleton& skeleton, const TransitionOptions& options = {});
+                                         const Skeleton& skeleton, const TransitionOptions& options = {},
+                                         std::span<const std::optional<FootContacts>> contacts = {});
 
 }  // namespace kinespace

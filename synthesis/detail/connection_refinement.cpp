@@ -108,10 +108,10 @@ double LegalRange::even() const {
   return std::log2(second->length_s / first->length_s);
 }
 
-// Speeds of 1/2 to 2, scales of the table, and those at which the smallest overlap fits into both motions.
+// The legal speeds, scales of the table, and those at which the smallest overlap fits into both motions.
 Interval LegalRange::scales() const {
-  return {std::max({even() + std::log2(least_speed), -scale_octaves, std::log2(shortest_s / first->length_s)}),
-          std::min({even() + std::log2(largest_speed), scale_octaves, std::log2(second->length_s / shortest_s)})};
+  return {std::max({even() - std::log2(fastest), -scale_octaves, std::log2(shortest_s / first->length_s)}),
+          std::min({even() + std::log2(fastest), scale_octaves, std::log2(second->length_s / shortest_s)})};
 }
 
 Interval LegalRange::shifts(double log_u) const {

@@ -12,6 +12,7 @@ struct LegalRange {
   const ConnectionMotion* first;
   const ConnectionMotion* second;
   double shortest_s;
+  double fastest = largest_speed;  // of one motion against the other, 1 to 2
 
   // log u at which both motions play at the same speed.
   [[nodiscard]] double even() const;

@@ -65,7 +65,7 @@ std::vector<GraphWay> best_ways(const ConnectionSpace& space, const ConnectionBo
     if (!for_group && candidate.cost_cm > kept.limit()) continue;
     --tries[motions.group[candidate.to]];
     const double limit = for_group ? std::max(kept.limit(), kept.group_limit(candidate.to)) : kept.limit();
-    const auto connection = space.connect(motions.ends[from], motions.starts[candidate.to], 0, limit);
+    const auto connection = space.connect(motions.ends[from], motions.starts[candidate.to], 0, {.give_up_cm = limit});
     if (connection) kept.offer({connection->cost_cm, candidate.to});
   }
   return std::move(kept).take();
