@@ -8,6 +8,9 @@
 #include <vector>
 
 #include "kinespace/base/parallel.h"
+#include "kinespace/motion/kinematics.h"
+#include <cstdio>
+#include <cstdlib>
 #include "kinespace/footskate/skate_measures.h"
 #include "kinespace/synthesis/connection.h"
 #include "kinespace/synthesis/transition.h"
@@ -152,7 +155,16 @@ void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) 
     const ClipRow& second = rows[random() % rows.size()];
     const Sources sources = sources_of(view, first, second);
     const Skeleton& skeleton = view.skeleton(first.skeleton_id);
-    seams.push_back(measured(sources, make_transition(space, sources.clips, skeleton)));
+    const Transition made = make_transition(space, sources.clips, skeleton);
+    seams.push_back(measured(sources, made));
+    if (getenv("KS_DEBUG")) {  // DEBUG
+      const Join& j = made.joins[0];
+      const JointPositions p = joint_positions(made.clip);
+      double worst = 0; int wf = 0, wj = 0;
+      const int from = std::max(1, int((made.begin[0] - .25) * made.clip.rate_hz)), to = std::min(made.clip.frames - 2, int((made.begin[0] + j.duration_s + .25) * made.clip.rate_hz));
+      for (int f = from; f <= to; ++f) for (int k = 0; k < p.joints; ++k) { const double a = (p.at(f+1,k) - 2*p.at(f,k) + p.at(f-1,k)).norm(); if (a > worst) { worst = a; wf = f; wj = k; } }
+      fprintf(stderr, "%d %s>%s way %d fp %d dur %.2f speed %.2f cost %.1f | est s %.2f a %.2f r %.2f | got s %.2f a %.2f r %.2f slide %.1f/%.1f low %.1f/%.1f pen %.1f | joint %s frame %d of %d..%d rate %.0f\n", i, first.name.c_str(), second.name.c_str(), int(j.way), int(j.feet_planned), j.duration_s, j.connection.speed(), j.connection.cost_cm, j.ratios.speed, j.ratios.acceleration, j.ratios.root_acceleration, seams.back().ratios.speed, seams.back().ratios.acceleration, seams.back().ratios.root_acceleration, seams.back().feet.slide_cm_s.value_or(-1), sources.slide.value_or(-1), seams.back().feet.lowest_speed_cm_s.value_or(-1), sources.lowest.value_or(-1), seams.back().feet.penetration_cm, skeleton.joints[wj].name.c_str(), wf, int(made.begin[0]*made.clip.rate_hz), int((made.begin[0]+j.duration_s)*made.clip.rate_hz), made.clip.rate_hz);
+    }
   }
   rows_of(data, "transition", seams, true, report);
 }

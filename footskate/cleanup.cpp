@@ -11,6 +11,7 @@
 #include "kinespace/footskate/contact_model.h"
 #include "kinespace/footskate/detail/leg_goals.h"
 #include "kinespace/footskate/detail/leg_pose.h"
+#include "kinespace/footskate/detail/root_path.h"
 #include "kinespace/footskate/skate_measures.h"
 
 namespace kinespace {
@@ -22,7 +23,8 @@ constexpr double settled_cm = 0.05;  // a pass that moves nothing by more is not
 
 LegGoals goals_for(const FootTracks& t, const Ground& ground, const std::vector<Plant>& plants) {
   const std::array<FloorUnder, 2> floors = {FloorUnder(t, ground, plants, 0), FloorUnder(t, ground, plants, 1)};
-  return leg_goals(t, floors, {foot_task(t, 0, plants, floors[0]), foot_task(t, 1, plants, floors[1])});
+  const std::array<FootTask, 2> tasks = {foot_task(t, 0, plants, floors[0]), foot_task(t, 1, plants, floors[1])};
+  return leg_goals(t, floors, tasks, root_shift(t, tasks));
 }
 
 Ground ground_for(const FootTracks& tracks, const CleanOptions& options) {

@@ -7,12 +7,18 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "kinespace/footskate/plants.h"
 
 namespace kinespace {
 
-// `tracks` are those of the clip, the tasks one a leg with an entry a frame.
-void guide_feet(Clip& clip, const FootTracks& tracks, const Ground& ground, const std::array<FootTask, 2>& tasks);
+struct GuidedFeet {
+  std::array<FootTask, 2> tasks;   // an entry a frame
+  std::vector<double> root_share;  // how much of its shift the root takes, an entry a frame, 0 to 1
+};
+
+// `tracks` are those of the clip. Ankles of nearly straight legs give by millimetres along the leg, so that no knee jerks.
+void guide_feet(Clip& clip, const FootTracks& tracks, const Ground& ground, const GuidedFeet& guide);
 
 }  // namespace kinespace

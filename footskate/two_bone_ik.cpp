@@ -11,22 +11,16 @@ using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-// At right angles to the thigh, nearly that of the bend, and that of the hint where there is hardly a bend.
+// At right angles to the thigh: that of the bend where the knee is clearly bent to the hint's side, that of the hint
+// where it is straight or bent to the other side, and smoothly between.
 Vector3d bending_axis(const TwoBoneLimb& limb, const Vector3d& thigh, const Vector3d& hint) {
-  constexpr double straight = 0.05;  // sine of about 3 degrees
+  constexpr double clear = 0.1;  // sine of about 6 degrees
   const Vector3d bend = knee_bend(limb);
-  const double share = std::max(0.0, 1 - bend.norm() / straight);
-  const Vector3d axis = bend + straight * share * share * hint;
+  const double side = std::clamp(bend.dot(hint) / clear, 0.0, 1.0);
+  const double share = hint.isZero() ? 1 : side * side * (3 - 2 * side);
+  const Vector3d axis = share > 0 ? Vector3d(share * bend.normalized() + (1 - share) * hint) : hint;
   const Vector3d across = axis - thigh * thigh.dot(axis);
   return across.norm() > 1e-12 ? across.normalized() : thigh.unitOrthogonal();
-}
-
-// The turn of the shin about `axis` after which cos(bend) = thigh . shin is as wished; 0 when it is so already.
-double knee_turn(const Vector3d& thigh, const Vector3d& shin, const Vector3d& axis, double wished_cosine) {
-  const double along = thigh.dot(shin);
-  const double across = thigh.dot(axis.cross(shin));
-  const double size = std::hypot(along, across);
-  return std::atan2(across, along) + std::acos(std::clamp(wished_cosine / size, -1.0, 1.0));
 }
 
 }  // namespace
@@ -43,23 +37,47 @@ Vector3d knee_bend(const TwoBoneLimb& limb) {
   return (limb.knee - limb.hip).normalized().cross((limb.ankle - limb.knee).normalized());
 }
 
-TwoBoneTurn reach_for(const TwoBoneLimb& limb, const Vector3d& target, const TwoBoneOptions& options) {
-  const double a = (limb.knee - limb.hip).norm();
-  const double b = (limb.ankle - limb.knee).norm();
-  assert(a > 0 && b > 0);
-  const Vector3d thigh = (limb.knee - limb.hip) / a;
-  const Vector3d shin = (limb.ankle - limb.knee) / b;
-  const double wish = std::max((target - limb.hip).norm(), std::abs(a - b) + 1e-6 * (a + b));
-  const double reach = soft_reach(wish, limb.reach(), a + b, options.soft_from);
-  const Vector3d axis = bending_axis(limb, thigh, options.knee_axis);
-  const Quaterniond bent(AngleAxisd(knee_turn(thigh, shin, axis, (reach * reach - a * a - b * b) / (2 * a * b)), axis));
-  const Vector3d ankle = limb.knee + b * (bent * shin) - limb.hip;
+double KneeHinge::reach(double at_bend) const {
+  return std::sqrt(std::max(0.0, thigh * thigh + shin * shin + 2 * thigh * shin * share * std::cos(at_bend)));
+}
+
+double KneeHinge::bend_for(double reach) const {
+  const double cosine = (reach * reach - thigh * thigh - shin * shin) / (2 * thigh * shin);
+  return std::acos(std::clamp(cosine / share, -1.0, 1.0));
+}
+
+KneeHinge knee_hinge(const TwoBoneLimb& limb, const Vector3d& knee_axis) {
+  KneeHinge out{.thigh = (limb.knee - limb.hip).norm(), .shin = (limb.ankle - limb.knee).norm()};
+  assert(out.thigh > 0 && out.shin > 0);
+  const Vector3d thigh = (limb.knee - limb.hip) / out.thigh;
+  const Vector3d shin = (limb.ankle - limb.knee) / out.shin;
+  out.axis = bending_axis(limb, thigh, knee_axis);
+  const double along = thigh.dot(shin);
+  const double across = thigh.dot(out.axis.cross(shin));
+  out.share = std::hypot(along, across);
+  out.bend = -std::atan2(across, along);
+  return out;
+}
+
+TwoBoneTurn bend_towards(const TwoBoneLimb& limb, const KneeHinge& hinge, double bend, const Vector3d& target) {
+  const Vector3d thigh = (limb.knee - limb.hip) / hinge.thigh;
+  const Vector3d shin = (limb.ankle - limb.knee) / hinge.shin;
+  const Quaterniond bent(AngleAxisd(bend - hinge.bend, hinge.axis));
+  const Vector3d ankle = limb.knee + hinge.shin * (bent * shin) - limb.hip;
   TwoBoneTurn out;
   out.thigh = Quaterniond::FromTwoVectors(ankle, target - limb.hip);
   out.shin = out.thigh * bent;
-  out.knee = limb.hip + a * (out.thigh * thigh);
-  out.ankle = out.knee + b * (out.shin * shin);
+  out.knee = limb.hip + hinge.thigh * (out.thigh * thigh);
+  out.ankle = out.knee + hinge.shin * (out.shin * shin);
   return out;
+}
+
+TwoBoneTurn reach_for(const TwoBoneLimb& limb, const Vector3d& target, const TwoBoneOptions& options) {
+  const KneeHinge hinge = knee_hinge(limb, options.knee_axis);
+  const double length = hinge.thigh + hinge.shin;
+  const double wish = std::max((target - limb.hip).norm(), std::abs(hinge.thigh - hinge.shin) + 1e-6 * length);
+  const double reach = soft_reach(wish, limb.reach(), length, options.soft_from);
+  return bend_towards(limb, hinge, hinge.bend_for(reach), target);
 }
 
 }  // namespace kinespace

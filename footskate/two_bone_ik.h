@@ -26,7 +26,8 @@ struct TwoBoneLimb {
 
 struct TwoBoneOptions {
   double soft_from = 0.99;  // share of the length, 0.5 to 1
-  // The axis of the knee, world, unit length: used where the leg is so straight that its plane cannot be told.
+  // The axis of the knee, world, unit length: used where the leg is so straight that its plane cannot be told, and for
+  // the side to which a knee bends (captured knees bend a little to the other side).
   Eigen::Vector3d knee_axis = Eigen::Vector3d::UnitX();
 };
 
@@ -40,6 +41,23 @@ struct TwoBoneTurn {
 
 // The axis about which the knee bends: thigh x shin, of length sin(bend).
 [[nodiscard]] Eigen::Vector3d knee_bend(const TwoBoneLimb& limb);
+
+// How a leg bends in its plane: reach^2 = thigh^2 + shin^2 + 2 thigh shin share cos(bend).
+struct KneeHinge {
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  // world, unit length, at right angles to the thigh
+  double thigh = 0, shin = 0;                       // cm
+  double share = 1;  // of the shin that lies in the plane; 1 for a hinge
+  double bend = 0;   // now, radians; 0: straight, < 0: bent to the other side
+
+  [[nodiscard]] double reach(double at_bend) const;
+  // The bend >= 0 at which the leg reaches so far, or as near to it as it comes.
+  [[nodiscard]] double bend_for(double reach) const;
+};
+[[nodiscard]] KneeHinge knee_hinge(const TwoBoneLimb& limb, const Eigen::Vector3d& knee_axis);
+
+// The leg with its knee bent so, and turned so that the ankle is in the direction of the target.
+[[nodiscard]] TwoBoneTurn bend_towards(const TwoBoneLimb& limb, const KneeHinge& hinge, double bend,
+                                       const Eigen::Vector3d& target);
 
 // The reach a leg of `length` takes that now reaches `now`, for a wish: soft as above.
 [[nodiscard]] double soft_reach(double wish, double now, double length, double soft_from = 0.99);

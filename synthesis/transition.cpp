@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -113,7 +114,7 @@ class Joiner {
     out.tracks = foot_tracks(clip, *first_.feet);
     if (!plan_feet || !first_.contacts_known || !second_.contacts_known) return out;
     const SeamFeet feet = feet_over(pair, shares, out, rate);
-    const Footsteps plan = plan_footsteps(feet);
+    const Footsteps plan = plan_footsteps(feet, join.pace);
     take_footsteps(clip, *out.tracks, first_.level.ground, feet, plan);
     out.feet_planned = put_legs(clip, out.curves);
     if (out.feet_planned) out.tracks = foot_tracks(clip, *first_.feet);
@@ -137,13 +138,48 @@ class Joiner {
     return join;
   }
 
+  // Placements for which feet that stand in both motions at once stand in one place: of the left foot, the right one,
+  // and between both.
+  [[nodiscard]] std::vector<GroundMotion> placements_by_feet(const Join& join) const {
+    std::vector<GroundMotion> out;
+    if (!first_.contacts_known || !second_.contacts_known) return out;
+    const double rate = first_.sampler.rate_hz();
+    JoinedPair pair(first_.sampler, second_.sampler, join);
+    Seam seam{.begin = 0, .end = static_cast<int>(join.duration_s * rate) + 1};
+    seam.curves = empty_curves(seam.end);
+    Eigen::RowVectorXd pose(first_.sampler.curves());
+    std::vector<JoinedPair::Shares> shares;
+    for (int f = 0; f < seam.end; ++f) shares.push_back(pair.at(f / rate, pose));
+    const SeamFeet feet = feet_over(pair, shares, seam, rate);
+    Eigen::Vector3d both = Eigen::Vector3d::Zero();
+    for (int leg = 0; leg < 2; ++leg) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      int count = 0;
+      for (int f = 0; f < feet.frames; ++f) {
+        if (feet.first.stands[leg][f] == 0 || feet.second.stands[leg][f] == 0) continue;
+        sum += feet.first.ankles[leg][f].position - feet.second.ankles[leg][f].position;
+        ++count;
+      }
+      if (count == 0) continue;
+      sum /= 100.0 * count;
+      both += sum / 2;
+      out.push_back(moved(join.placement, sum));
+    }
+    if (out.size() == 2) out.push_back(moved(join.placement, both));
+    return out;
+  }
+
  private:
+  static GroundMotion moved(const GroundMotion& by, const Eigen::Vector3d& further_m) {
+    return {by.turn_rad, by.x_m + further_m.x(), by.z_m + further_m.z()};
+  }
+
   // Room for the root and the feet to come back to the motions themselves; no seam reaches into its neighbour's.
   [[nodiscard]] Margins margins_of(const Join& join) const {
-    constexpr double around_s = 1.5;
+    constexpr double before_s = 0.4, after_s = 1.5;
     const double rate = first_.sampler.rate_hz();
-    const double before = std::clamp(join.connection.leave_s - least_leave_s_, 0.0, around_s);
-    const double after = std::clamp(largest_entered_s_ - join.connection.entered_s, 0.0, around_s);
+    const double before = std::clamp(join.connection.leave_s - least_leave_s_, 0.0, before_s);
+    const double after = std::clamp(largest_entered_s_ - join.connection.entered_s, 0.0, after_s);
     return {static_cast<int>(before * rate), static_cast<int>(after * rate)};
   }
 
@@ -217,7 +253,7 @@ class Joiner {
 double badness(const Join& join) {
   const auto over = [](double ratio, double allowed) { return std::max(0.0, ratio - allowed); };
   double out = 3 * over(join.ratios.speed, 1) + 3 * over(join.ratios.acceleration, 1) +
-               over(join.ratios.root_acceleration, 1);
+               over(join.ratios.root_acceleration, 1) + 2 * over(join.ratios.root_acceleration, 1.4);
   out += 0.2 * (join.ratios.worst() + join.ratios.root_acceleration);
   if (join.feet) {
     const FootMotion& feet = *join.feet;
@@ -276,33 +312,104 @@ std::optional<Join> inertialized_join(const Connection& connection, const Source
   return join;
 }
 
+// Tries joins and keeps the best.
+class BestJoin {
+ public:
+  BestJoin(const Joiner& joiner, bool plan_feet) : joiner_(joiner), plan_feet_(plan_feet) {}
+
+  void consider(const Join& plain) {
+    const Join join = joiner_.measured(plain, plan_feet_);
+    tried_.emplace_back(badness(join), join);
+    if (!best_ || tried_.back().first < tried_[*best_].first) best_ = tried_.size() - 1;
+  }
+
+  // Whether something can still be seen of the seam: then it is worth while to look further.
+  [[nodiscard]] bool can_be_seen() const {
+    if (!best_) return false;
+    const Join& join = tried_[*best_].second;
+    if (join.ratios.worst() > 1 || join.ratios.root_acceleration > 1.2) return true;
+    if (!join.feet) return false;
+    constexpr double seen_cm_s = 2;
+    return join.feet->slide_cm_s.value_or(0) > 1.5 * std::max(seen_cm_s, join.feet_of_sources->slide_cm_s.value_or(0));
+  }
+
+  // The best of those tried so far, each once more with what `vary` makes of it.
+  template <typename Vary>
+  void vary_best(std::size_t count, const Vary& vary) {
+    std::vector<std::size_t> order(tried_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return tried_[i].first; });
+    order.resize(std::min(count, order.size()));
+    std::vector<Join> chosen;
+    for (const std::size_t i : order) chosen.push_back(tried_[i].second);
+    for (const Join& join : chosen) {
+      for (const Join& varied : vary(join)) consider(varied);
+    }
+  }
+
+  [[nodiscard]] std::optional<Join> best() const {
+    return best_ ? std::optional(tried_[*best_].second) : std::nullopt;
+  }
+
+ private:
+  const Joiner& joiner_;
+  bool plan_feet_;
+  std::vector<std::pair<double, Join>> tried_;
+  std::optional<std::size_t> best_;
+};
+
 std::optional<Join> best_join(const ConnectionSpace& space, const ConnectionMotion& end, const ConnectionMotion& start,
                               const Source& first, const Source& second, const Skeleton& skeleton, const Joiner& joiner,
                               const TransitionOptions& options) {
-  std::optional<Join> best;
-  double least = std::numeric_limits<double>::infinity();
-  const auto consider = [&](const Join& plain) {
-    const Join join = joiner.measured(plain, options.plan_feet);
-    const double bad = badness(join);
-    if (bad < least) std::tie(best, least) = std::pair(join, bad);
-  };
+  BestJoin search(joiner, options.plan_feet);
+  std::vector<Connection> connections;
   const double window = std::min(end.length_s, start.length_s);
   for (const double shortest : {space.options().shortest_s, 0.5, 0.8, 1.2, 1.6, window}) {
     if (shortest < space.options().shortest_s || shortest > window) continue;
     auto connection = space.connect(end, start, shortest, {.largest_speed = options.largest_speed});
     if (!connection) connection = space.connect(end, start, shortest);
-    if (!connection) continue;
-    if (options.way != JoinWay::inertialization) {
-      for (const double stretch : {1.0, 1.25}) consider(blended_join(*connection, first, second, stretch, skeleton));
-    }
-    if (options.way != JoinWay::blend) {
-      for (const double duration : {0.3, 0.5, 0.8}) {
-        const auto join = inertialized_join(*connection, first, second, duration, skeleton);
-        if (join) consider(*join);
+    if (connection) connections.push_back(*connection);
+  }
+  const auto try_all = [&](std::span<const double> stretches, std::span<const double> durations_s) {
+    for (const Connection& connection : connections) {
+      for (const double stretch : stretches) {
+        if (options.way == JoinWay::inertialization) break;
+        search.consider(blended_join(connection, first, second, stretch, skeleton));
+      }
+      for (const double duration : durations_s) {
+        if (options.way == JoinWay::blend) break;
+        const auto join = inertialized_join(connection, first, second, duration, skeleton);
+        if (join) search.consider(*join);
       }
     }
+  };
+  constexpr std::array<double, 2> usual_stretches{1.0, 1.25}, more_stretches{1.6, 2.0};
+  constexpr std::array<double, 3> usual_durations_s{0.3, 0.5, 0.8};
+  constexpr std::array<double, 2> more_durations_s{1.1, 1.5};
+  try_all(usual_stretches, usual_durations_s);
+  constexpr std::size_t varied = 4;
+  if (options.plan_feet && search.can_be_seen()) {
+    search.vary_best(varied, [&](const Join& join) {
+      std::vector<Join> out;
+      for (const GroundMotion& placement : joiner.placements_by_feet(join)) {
+        out.push_back(join);
+        out.back().placement = placement;
+      }
+      return out;
+    });
   }
-  return best;
+  if (search.can_be_seen()) try_all(more_stretches, more_durations_s);
+  if (options.plan_feet && search.can_be_seen()) {
+    search.vary_best(varied, [](Join join) {
+      std::vector<Join> out;
+      for (const double pace : {1.6, 2.4}) {
+        join.pace = pace;
+        out.push_back(join);
+      }
+      return out;
+    });
+  }
+  return search.best();
 }
 
 // A quaternion's sign means nothing; from row to row it stays on its side.

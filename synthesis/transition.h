@@ -57,6 +57,7 @@ struct Join {
   GroundMotion placement;  // of the second, from its own frame (ClipCurves) into the first's
   double duration_s = 0;   // of the overlap, by the output's clock
   double stretch = 1;      // the overlap is played so much slower than the motions alone would have it
+  double pace = 1;         // steps of feet that have to go last so much longer than they usually do
   SeamRatios ratios;
   // Feet over the overlap, and over both motions alone (the mean); nullopt where no legs can be told.
   std::optional<FootMotion> feet, feet_of_sources;

@@ -1,10 +1,10 @@
 #include "kinespace/footskate/detail/leg_goals.h"
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "kinespace/footskate/detail/leg_swing.h"
-#include "kinespace/footskate/detail/root_path.h"
 
 namespace kinespace {
 namespace {
@@ -53,8 +53,8 @@ void keep_above(const FootTracks& t, const FloorUnder& floor, int leg, const Foo
 }  // namespace
 
 LegGoals leg_goals(const FootTracks& tracks, const std::array<FloorUnder, 2>& floors,
-                   const std::array<FootTask, 2>& tasks) {
-  LegGoals out{.root_shift = root_shift(tracks, tasks), .sides = {}};
+                   const std::array<FootTask, 2>& tasks, std::vector<Vector3d> shift) {
+  LegGoals out{.root_shift = std::move(shift), .sides = {}};
   for (int leg = 0; leg < 2; ++leg) {
     LegGoals::Side& side = out.sides[leg];
     side.ankle = ankle_goals(tracks, leg, tasks[leg], out.root_shift);

@@ -2,15 +2,16 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "kinespace/footskate/detail/leg_pose.h"
 #include "kinespace/footskate/plants.h"
 
 namespace kinespace {
 
-// The root moved so that planted legs reach, ankles where the tasks say and carried over between, no foot under its
-// floor.
+// Ankles where the tasks say and carried over between, no foot under its floor, for a root that moves by `shift`
+// (detail/root_path.h).
 [[nodiscard]] LegGoals leg_goals(const FootTracks& tracks, const std::array<FloorUnder, 2>& floors,
-                                 const std::array<FootTask, 2>& tasks);
+                                 const std::array<FootTask, 2>& tasks, std::vector<Eigen::Vector3d> shift);
 
 }  // namespace kinespace

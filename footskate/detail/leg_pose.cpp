@@ -1,7 +1,9 @@
 #include "kinespace/footskate/detail/leg_pose.h"
 
 #include <algorithm>
+#include <cstdlib>
 
+#include "kinespace/footskate/detail/knee_bends.h"
 #include "kinespace/footskate/two_bone_ik.h"
 #include "kinespace/motion/kinematics.h"
 
@@ -47,10 +49,21 @@ class LegPoser {
  public:
   LegPoser(Clip& clip, const Leg& leg) : clip_(clip), leg_(leg), axis_(mean_knee_axis(clip, leg)) {}
 
-  void pose(int frame, const Vector3d& target, const Vector3d& foot_turn, std::vector<JointFrame>& w) {
-    const TwoBoneLimb limb{w[leg_.hip].position, w[leg_.knee].position, w[leg_.ankle].position};
+  // How the leg bends and shall reach at a frame.
+  [[nodiscard]] LegWish wish(const Vector3d& target, const std::vector<JointFrame>& w) const {
+    const TwoBoneLimb limb = limb_of(w);
+    const KneeHinge hinge = knee_hinge(limb, w[leg_.hip].rotation * axis_);
+    return {.hinge = hinge,
+            .reach = soft_reach((target - limb.hip).norm(), limb.reach(), limb.length()),
+            .changes = (target - limb.ankle).norm() > unmoved_cm};
+  }
+
+  // The ankle in the direction of the target, the knee bent as said.
+  void pose(int frame, const Vector3d& target, double bend, const Vector3d& foot_turn, std::vector<JointFrame>& w) {
+    const TwoBoneLimb limb = limb_of(w);
     if ((target - limb.ankle).norm() <= unmoved_cm && foot_turn.norm() <= 1e-9) return;
-    const TwoBoneTurn turn = reach_for(limb, target, {.knee_axis = w[leg_.hip].rotation * axis_});
+    const KneeHinge hinge = knee_hinge(limb, w[leg_.hip].rotation * axis_);
+    const TwoBoneTurn turn = bend_towards(limb, hinge, bend, target);
     set_world(clip_, leg_.hip, frame, parent(leg_.hip, w), turn.thigh * w[leg_.hip].rotation);
     set_world(clip_, leg_.knee, frame, turn.thigh * parent(leg_.knee, w), turn.shin * w[leg_.knee].rotation);
     set_world(clip_, leg_.ankle, frame, turn.shin * parent(leg_.ankle, w),
@@ -58,6 +71,9 @@ class LegPoser {
   }
 
  private:
+  [[nodiscard]] TwoBoneLimb limb_of(const std::vector<JointFrame>& w) const {
+    return {w[leg_.hip].position, w[leg_.knee].position, w[leg_.ankle].position};
+  }
   [[nodiscard]] Quaterniond parent(int joint, const std::vector<JointFrame>& w) const {
     const int above = clip_.skeleton.joints[joint].parent;
     return above >= 0 ? w[above].rotation : Quaterniond::Identity();
@@ -81,14 +97,23 @@ Vector3d mean_knee_axis(const Clip& clip, const Leg& leg) {
   return sum.norm() > 1e-9 ? sum.normalized() : Vector3d::Zero();
 }
 
-void pose_legs(Clip& clip, const Feet& feet, const LegGoals& goals) {
+void pose_legs(Clip& clip, const Feet& feet, const LegGoals& told) {
+  LegGoals goals = told;
+  if (getenv("KS_GIVE") && goals.give_cm < 0.1) goals.give_cm = atof(getenv("KS_GIVE"));  // DEBUG
   shift_root(clip, feet, goals.root_shift);
   std::array<LegPoser, 2> posers = {LegPoser(clip, feet.legs[0]), LegPoser(clip, feet.legs[1])};
+  std::array<std::vector<LegWish>, 2> wishes;
   std::vector<JointFrame> world;
   for (int f = 0; f < clip.frames; ++f) {
     world_frames(clip, f, world);
+    for (int side = 0; side < 2; ++side) wishes[side].push_back(posers[side].wish(goals.sides[side].ankle[f], world));
+  }
+  const std::array<std::vector<double>, 2> bends = {bends_for(wishes[0], clip.rate_hz, goals.give_cm),
+                                                    bends_for(wishes[1], clip.rate_hz, goals.give_cm)};
+  for (int f = 0; f < clip.frames; ++f) {
+    world_frames(clip, f, world);
     for (int side = 0; side < 2; ++side) {
-      posers[side].pose(f, goals.sides[side].ankle[f], goals.sides[side].foot_turn[f], world);
+      posers[side].pose(f, goals.sides[side].ankle[f], bends[side][f], goals.sides[side].foot_turn[f], world);
     }
   }
 }

@@ -19,6 +19,7 @@ struct LegGoals {
   };
   std::vector<Eigen::Vector3d> root_shift;  // cm, world
   std::array<Side, 2> sides;
+  double give_cm = 0.0015;  // of the ankles of nearly straight legs, so that knees stay smooth (knee_bends.h)
 };
 
 // Meets these goals by two-bone inverse kinematics (footskate/two_bone_ik.h). A foot keeps its orientation in the world

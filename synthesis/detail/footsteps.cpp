@@ -18,16 +18,22 @@ constexpr double step_cm_s = 250;
 constexpr double longest_step_s = 0.35;
 constexpr double settle_s = 0.5;      // in which a held foot's offset goes after its stance
 
+double eased(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * x * (x * (6 * x - 15) + 10);
+}
+
 double ground_distance(const Vector3d& a, const Vector3d& b) {
   return std::hypot(a.x() - b.x(), a.z() - b.z());
 }
 
-int frames_for(double way_cm, double rate_hz) {
-  return std::max(2, static_cast<int>(std::ceil(std::min(step_base_s + way_cm / step_cm_s, longest_step_s) * rate_hz)));
+int frames_for(double way_cm, double rate_hz, double pace) {
+  const double lasts_s = pace * std::min(step_base_s + way_cm / step_cm_s, longest_step_s);
+  return std::max(2, static_cast<int>(std::ceil(lasts_s * rate_hz)));
 }
 
 // How a leg changes over at a frame of the overlap.
-LegSteps change_at(const SeamFeet& feet, int leg, int change) {
+LegSteps change_at(const SeamFeet& feet, int leg, int change, double pace) {
   const auto& first = feet.first.stands[leg];
   const auto& second = feet.second.stands[leg];
   LegSteps out{.last_of_first = change - 1, .first_of_second = change};
@@ -42,7 +48,7 @@ LegSteps change_at(const SeamFeet& feet, int leg, int change) {
   out.held = leaves && lands && out.first_of_second - out.last_of_first <= 1 && out.way_cm <= held_cm;
   if (out.held || !leaves || !lands) return out;
   // A step that would be too short takes from both stances, as far as there is something to take.
-  const int wanted = frames_for(out.way_cm, feet.rate_hz);
+  const int wanted = frames_for(out.way_cm, feet.rate_hz, pace);
   for (bool earlier = true; out.first_of_second - out.last_of_first < wanted; earlier = !earlier) {
     const bool can_leave = out.last_of_first > 0;
     const bool can_land = out.first_of_second + 1 < feet.frames;
@@ -73,7 +79,7 @@ double cost_of(const SeamFeet& feet, int leg, int change, const LegSteps& steps)
                      taken(change, std::min(steps.first_of_second, feet.frames), feet.second.stands[leg]));
   cost += steps.held ? steps.way_cm / 20 : 0;
   // A swing that is quicker than a step should be.
-  const double lacking = frames_for(steps.way_cm, feet.rate_hz) - (steps.first_of_second - steps.last_of_first);
+  const double lacking = frames_for(steps.way_cm, feet.rate_hz, 1) - (steps.first_of_second - steps.last_of_first);
   if (!steps.held) cost += 5 * std::max(0.0, lacking) / feet.rate_hz;
   // Changing over where both motions count is best.
   const double middle = 0.5 * (feet.begin + feet.end);
@@ -175,11 +181,6 @@ class LegTask {
     }
   }
 
-  static double eased(double x) {
-    x = std::clamp(x, 0.0, 1.0);
-    return x * x * x * (x * (6 * x - 15) + 10);
-  }
-
   const SeamFeet& feet_;
   int leg_;
   const LegSteps& steps_;
@@ -189,14 +190,14 @@ class LegTask {
 
 }  // namespace
 
-Footsteps plan_footsteps(const SeamFeet& feet) {
+Footsteps plan_footsteps(const SeamFeet& feet, double pace) {
   std::array<std::vector<LegSteps>, 2> ways;
   std::array<std::vector<double>, 2> costs;
   constexpr int changes_tried = 24;
   const int apart = std::max(1, (feet.end - feet.begin) / changes_tried);
   for (int leg = 0; leg < 2; ++leg) {
     for (int change = std::max(1, feet.begin); change <= std::min(feet.end, feet.frames - 1); change += apart) {
-      ways[leg].push_back(change_at(feet, leg, change));
+      ways[leg].push_back(change_at(feet, leg, change, pace));
       costs[leg].push_back(cost_of(feet, leg, change, ways[leg].back()));
     }
   }
@@ -216,9 +217,16 @@ Footsteps plan_footsteps(const SeamFeet& feet) {
 void take_footsteps(Clip& blend, const FootTracks& tracks, const Ground& ground, const SeamFeet& feet,
                     const Footsteps& plan) {
   const auto ankles = ankles_of(blend, tracks.feet);
-  const std::array<FootTask, 2> tasks{LegTask(feet, 0, plan.legs[0], ankles[0]).make(),
-                                      LegTask(feet, 1, plan.legs[1], ankles[1]).make()};
-  guide_feet(blend, tracks, ground, tasks);
+  GuidedFeet guide{.tasks = {LegTask(feet, 0, plan.legs[0], ankles[0]).make(),
+                             LegTask(feet, 1, plan.legs[1], ankles[1]).make()},
+                   .root_share = {}};
+  // The root is at home at both ends of what is looked at.
+  for (int f = 0; f < feet.frames; ++f) {
+    const double before = f < feet.begin ? static_cast<double>(f) / feet.begin : 1;
+    const double after = f >= feet.end ? static_cast<double>(feet.frames - 1 - f) / (feet.frames - feet.end) : 1;
+    guide.root_share.push_back(eased(std::min(before, after)));
+  }
+  guide_feet(blend, tracks, ground, guide);
 }
 
 std::array<std::vector<JointFrame>, 2> ankles_of(const Clip& clip, const Feet& feet) {

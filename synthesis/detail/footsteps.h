@@ -44,7 +44,8 @@ struct Footsteps {
   double cost = 0;
 };
 
-[[nodiscard]] Footsteps plan_footsteps(const SeamFeet& feet);
+// Steps last `pace` times as long as they usually do, 1 or more.
+[[nodiscard]] Footsteps plan_footsteps(const SeamFeet& feet, double pace = 1);
 
 // Puts the legs of the blend where the plan has them.
 void take_footsteps(Clip& blend, const FootTracks& tracks, const Ground& ground, const SeamFeet& feet,
