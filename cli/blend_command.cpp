@@ -58,6 +58,7 @@ void add_blend(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--lod", options->functions, "Use only the first N functions")->check(number_from_zero());
   command->add_flag("--clean-feet", options->output.clean_feet, "Take foot skate out of the result");
+  command->add_flag("--strict", options->output.strict, "With --clean-feet: feet that get worse are an error");
   command->add_option("--picture", options->output.picture, "Also write stick figures, .svg");
   command->add_flag("--json", options->output.json, "Print the figures as one JSON object");
   session.files.reads(command, {"LIB"});

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "cli/commands.h"
+#include "cli/foot_figures.h"
 #include "cli/json_output.h"
 #include "kinespace/base/file.h"
 #include "kinespace/footskate/cleanup.h"
@@ -22,6 +23,7 @@ struct CleanCommandOptions {
   std::optional<double> floor_cm;
   std::optional<std::filesystem::path> library;
   std::optional<std::filesystem::path> picture;
+  bool strict = false;
   bool json = false;
 };
 
@@ -46,6 +48,8 @@ Json to_json(const CleanCommandOptions& options, const CleanResult& result) {
           {"foot_slide_before_cm_s", or_null(r.foot_slide_before_cm_s)},
           {"foot_slide_after_cm_s", or_null(r.foot_slide_after_cm_s)},
           {"floor_penetration_cm", r.floor_penetration_cm},
+          {"feet_before", foot_figures(r.feet_before)},
+          {"feet_after", foot_figures(r.feet_after)},
           {"mean_pose_change_cm", r.mean_pose_change_cm},
           {"acceleration_ratio", r.acceleration_ratio},
           {"ground", to_string(r.ground.kind)},
@@ -71,9 +75,9 @@ void run_clean(const CleanCommandOptions& options, Session& session) {
   if (options.picture) before = clip;
   const CleanResult result = clean(std::move(clip), clean_options);
   Session::check_stop();
+  session.doubt_result(doubts_about(result.report), options.strict);
   write_clip(options.output, result.clip);
   if (options.picture) write_picture(*options.picture, *before, result);
-  for (const std::string& doubt : doubts_about(result.report)) session.warn(doubt);
   const Json out = to_json(options, result);
   options.json ? print_json(out) : print_fields(out);
 }
@@ -90,6 +94,7 @@ void add_clean(CLI::App& app, Session& session) {
   command->add_option("--floor", options->floor_cm, "The floor is flat at this height in cm; estimated otherwise");
   command->add_option("--library", options->library, "Use the contact labels of this library (kinespace contacts)");
   command->add_option("--picture", options->picture, "Also write stick figures with the plants marked, .svg");
+  command->add_flag("--strict", options->strict, "A result that is worse than its input is an error: nothing is written");
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
   session.files.reads(command, {"IN", "--library"});
   session.files.writes(command, {"--output"});

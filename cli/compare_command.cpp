@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/foot_figures.h"
 #include "cli/json_output.h"
 #include "kinespace/footskate/skate_measures.h"
 #include "kinespace/motion/error_measures.h"
@@ -39,6 +40,8 @@ void add_skate(Json& result, const Clip& reference, const Clip& other, Session& 
   }
   result["foot_slide_cm_s"] = skate ? or_null(skate->foot_slide_cm_s) : Json(nullptr);
   result["floor_penetration_cm"] = skate ? Json(skate->floor_penetration_cm) : Json(nullptr);
+  result["feet_of_a"] = foot_figures(skate ? std::optional(skate->of_a) : std::nullopt);
+  result["feet_of_b"] = foot_figures(skate ? std::optional(skate->of_b) : std::nullopt);
 }
 
 void run_compare(const CompareOptions& options, Session& session) {

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/foot_figures.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
 #include "kinespace/base/error.h"
@@ -37,8 +38,9 @@ FrameRange asked_gap(const Clip& clip, double from_s, double to_s) {
     throw Error(ErrorKind::usage, {.found = fmt::format("--from {} --to {}", from_s, to_s),
                                    .expected = fmt::format("times in order, from 0 to {:.3f} s", end_s)});
   }
-  const FrameRange gap{static_cast<int>(std::ceil(from_s * clip.rate_hz - 1e-6)),
-                       static_cast<int>(std::floor(to_s * clip.rate_hz + 1e-6))};
+  // A time means the frame that is nearest to it.
+  const FrameRange gap{static_cast<int>(std::lround(from_s * clip.rate_hz)),
+                       static_cast<int>(std::lround(to_s * clip.rate_hz))};
   if (gap.count() < 1) {
     throw Error(ErrorKind::usage,
                 {.found = fmt::format("no frame from {} s to {} s", from_s, to_s),
@@ -139,7 +141,8 @@ void run_fill(const FillCommandOptions& options, Session& session) {
               {"frames", clip.frames},
               {"clips", model.clips()},
               {"found", !options.from_s.has_value()},
-              {"gaps", std::move(list)}});
+              {"gaps", std::move(list)},
+              {"feet", foot_figures(result.clip)}});
 }
 
 }  // namespace

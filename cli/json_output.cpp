@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -51,13 +54,21 @@ void print_json(const Json& object) {
 }
 
 void print_fields(const Json& object) {
-  std::size_t width = 0;
-  for (const auto& [key, value] : object.items()) width = std::max(width, key.size());
+  std::vector<std::pair<std::string, std::string>> lines;
+  const auto add = [&](std::string name, const Json& value) {
+    std::ranges::replace(name, '_', ' ');
+    lines.emplace_back(std::move(name), shown(value));
+  };
   for (const auto& [key, value] : object.items()) {
-    std::string name = key;
-    std::replace(name.begin(), name.end(), '_', ' ');
-    print("{:<{}}  {}\n", name, width, shown(value));
+    if (!value.is_object()) {
+      add(key, value);
+      continue;
+    }
+    for (const auto& [inner, of_inner] : value.items()) add(key + ": " + inner, of_inner);
   }
+  std::size_t width = 0;
+  for (const auto& [name, value] : lines) width = std::max(width, name.size());
+  for (const auto& [name, value] : lines) print("{:<{}}  {}\n", name, width, value);
 }
 
 }  // namespace kinespace::cli

@@ -170,6 +170,16 @@ void Session::warn(std::string_view text) {
   tell(text);
 }
 
+void Session::doubt_result(const std::vector<std::string>& doubts, bool strict) {
+  for (const std::string& doubt : doubts) {
+    if (strict) {
+      throw Error(ErrorKind::bad_input,
+                  {.found = doubt, .expected = "a result no worse than its input", .remedy = "leave --strict out"});
+    }
+    warn(doubt);
+  }
+}
+
 void Session::note(std::string_view text) {
   if (!quiet) warn(text);
 }

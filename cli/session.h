@@ -54,6 +54,9 @@ class Session {
   void note(std::string_view text);
   void detail(std::string_view text);
 
+  // What a user should know before believing a result: warned of, or, when `strict`, an error before anything is written.
+  void doubt_result(const std::vector<std::string>& doubts, bool strict);
+
   // Notes what in a clip that was read looks wrong (motion/plausibility.h): its unit, which way is up, its floor.
   void note_doubts(const Clip& clip);
 

@@ -1,5 +1,6 @@
 #include "cli/synthesis_output.h"
 
+#include "cli/foot_figures.h"
 #include "cli/session.h"
 #include "kinespace/base/file.h"
 #include "kinespace/footskate/cleanup.h"
@@ -26,7 +27,7 @@ void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector
             {"foot_slide_before_cm_s", or_null(report.foot_slide_before_cm_s)},
             {"foot_slide_after_cm_s", or_null(report.foot_slide_after_cm_s)},
             {"floor_penetration_cm", report.floor_penetration_cm}};
-    for (const std::string& doubt : doubts_about(report)) session.warn(doubt);
+    session.doubt_result(doubts_about(report), output.strict);
     clip = cleaned.clip;
   }
   Session::check_stop();
@@ -36,6 +37,7 @@ void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector
   result["frames"] = clip.frames;
   result["rate_hz"] = clip.rate_hz;
   result["duration_s"] = clip.duration_s();
+  result["feet"] = foot_figures(clip);
   result.update(feet.is_null() ? Json::object() : feet);
 }
 

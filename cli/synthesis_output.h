@@ -16,11 +16,12 @@ struct SynthesisOutput {
   std::filesystem::path file;
   std::optional<std::filesystem::path> picture;
   bool clean_feet = false;
+  bool strict = false;  // a cleanup that makes things worse is an error, and nothing is written
   bool json = false;
 };
 
 // Cleans the feet when asked, writes the motion and the picture, and adds to `result`: output, frames, duration_s,
-// rate_hz, and what the cleanup did. `bands`: what to mark in the picture.
+// rate_hz, feet (foot_figures.h), and what the cleanup did. `bands`: what to mark in the picture.
 void write_synthesis(const SynthesisOutput& output, Clip clip, const std::vector<StripBand>& bands, Json& result,
                      Session& session);
 

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "cli/commands.h"
+#include "cli/foot_figures.h"
 #include "cli/json_output.h"
 #include "cli/synthesis_output.h"
 #include "kinespace/motion/file_formats.h"
@@ -39,7 +40,12 @@ Json seam_json(const PlannedTransition& plan, std::size_t i) {
           {"leave_s", join.connection.leave_s},
           {"enter_s", join.connection.enter_s},
           {"seam_speed_ratio", join.ratios.speed},
-          {"seam_acceleration_ratio", join.ratios.acceleration}};
+          {"seam_acceleration_ratio", join.ratios.acceleration},
+          {"seam_root_acceleration_ratio", join.ratios.root_acceleration},
+          {"way", to_string(join.way)},
+          {"feet_planned", join.feet_planned},
+          {"feet", foot_figures(join.feet)},
+          {"feet_of_clips", foot_figures(join.feet_of_sources)}};
 }
 
 // Of a single seam its figures; of several those of the seam that costs most, and the largest ratios.
@@ -57,6 +63,7 @@ Json to_json(const PlannedTransition& plan) {
   out["cost"] = joins.empty() ? 0 : worst->connection.cost_cm;
   out["seam_speed_ratio"] = largest(&SeamRatios::speed);
   out["seam_acceleration_ratio"] = largest(&SeamRatios::acceleration);
+  out["seam_root_acceleration_ratio"] = largest(&SeamRatios::root_acceleration);
   out["seams"] = Json::array();
   for (std::size_t i = 0; i < joins.size(); ++i) out["seams"].push_back(seam_json(plan, i));
   return out;
@@ -110,7 +117,10 @@ void add_transition(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_option("--overlap", options->plan.graph.connection.shortest_s, "The smallest overlap in seconds")
       ->capture_default_str();
-  command->add_flag("--clean-feet", options->output.clean_feet, "Take foot skate out of the result");
+  command->add_flag("!--no-clean-feet", options->plan.join.plan_feet,
+                    "Leave the feet as the blend has them; else they are planted over each overlap");
+  command->add_flag("--clean-feet", options->output.clean_feet, "Take foot skate out of the clips as well");
+  command->add_flag("--strict", options->output.strict, "With --clean-feet: feet that get worse are an error");
   command->add_option("--picture", options->output.picture, "Also write stick figures with the seams marked, .svg");
   command->add_flag("--json", options->output.json, "Print the figures as one JSON object");
   session.files.updates(command, {"LIB"});  // the graph is kept in it

@@ -12,7 +12,6 @@
 #include "kinespace/footskate/detail/leg_goals.h"
 #include "kinespace/footskate/detail/leg_pose.h"
 #include "kinespace/footskate/detail/root_path.h"
-#include "kinespace/footskate/skate_measures.h"
 
 namespace kinespace {
 namespace {
@@ -87,10 +86,12 @@ double deepest_cm(const FootTracks& tracks, const CleanReport& report) {
 }
 
 // What there is to say of a cleaned clip; `acceleration_before`: the largest of the clip as it was.
-void measure(const LegTracks& before, double acceleration_before, const FootContacts& contacts, CleanResult& result) {
+void measure(const LegTracks& before, double acceleration_before, const FootContacts& contacts, const FootLevel& level,
+             CleanResult& result) {
   CleanReport& report = result.report;
   const FootTracks after = foot_tracks(result.clip, report.feet);
   report.foot_slide_after_cm_s = foot_slide_cm_s(after, contacts);
+  report.feet_after = foot_motion(after, level);
   report.floor_penetration_cm = deepest_cm(after, report);
   report.mean_pose_change_cm = mean_pose_change_since(before, result.clip);
   report.largest_move_cm = largest_move_since(before, result.clip);
@@ -137,6 +138,12 @@ std::vector<std::string> doubts_about(const CleanReport& report) {
     out.push_back(fmt::format("planted feet slide more than before: {:.2f} cm/s, before {:.2f} cm/s",
                               *report.foot_slide_after_cm_s, *report.foot_slide_before_cm_s));
   }
+  const double slid = report.feet_before.slide_cm_s.value_or(0);
+  constexpr double noticed_cm_s = 0.5;
+  if (report.feet_after.slide_cm_s.value_or(0) > slid + noticed_cm_s) {
+    out.push_back(fmt::format("low, slow feet slide more than before: {:.2f} cm/s, before {:.2f} cm/s",
+                              *report.feet_after.slide_cm_s, slid));
+  }
   if (report.acceleration_ratio > usual_ratio) {
     out.push_back(fmt::format("the largest acceleration of a joint is {:.1f} times what it was: look at the result",
                               report.acceleration_ratio));
@@ -151,6 +158,8 @@ CleanResult clean(Clip clip, const CleanOptions& options) {
   report.feet = require_feet(out.clip, options.feet);
   FootTracks tracks = foot_tracks(out.clip, report.feet);
   report.ground = ground_for(tracks, options);
+  const FootLevel level{.ground = report.ground, .standing_cm = standing_heights(tracks, report.ground)};
+  report.feet_before = foot_motion(tracks, level);
   const FootContacts contacts = contacts_for(tracks, report.ground, options);
   check_contacts(out.clip, tracks, contacts);
   report.foot_slide_before_cm_s = foot_slide_cm_s(tracks, contacts);
@@ -164,7 +173,7 @@ CleanResult clean(Clip clip, const CleanOptions& options) {
     ground = ground_for(tracks, options);
     plants = place_plants(tracks, ground, contacts_for(tracks, ground, options));
   }
-  measure(before, acceleration, contacts, out);
+  measure(before, acceleration, contacts, level, out);
   return out;
 }
 

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "kinespace/footskate/plants.h"
+#include "kinespace/footskate/skate_measures.h"
 
 namespace kinespace {
 
@@ -41,6 +42,7 @@ struct CleanReport {
   std::optional<double> foot_slide_after_cm_s;   // over the same frames
   double floor_penetration_cm =
       0;  // after: the deepest joint; uneven ground: below the lower of its plants before and after
+  FootMotion feet_before, feet_after;  // by geometry alone, over the ground and the standing heights of the input
   double mean_pose_change_cm = 0;  // footskate/skate_measures.h
   double largest_move_cm = 0;      // of any joint, world
   double acceleration_ratio = 1;   // the largest of any joint, after over before; 1 where nothing moves
@@ -53,7 +55,7 @@ struct CleanResult {
 };
 
 // What a user should know before believing the result, a sentence each: that no foot was found to stand, so that
-// nothing was cleaned and nothing is known of what slides; that feet slide more than before; that a joint is jerked
+// nothing was cleaned and nothing is known of what slides; that feet slide more than before, those that were planted or by geometry alone; that a joint is jerked
 // more than half as much again. Empty when all is well.
 [[nodiscard]] std::vector<std::string> doubts_about(const CleanReport& report);
 

@@ -169,9 +169,12 @@ std::optional<SkateFigures> compare_skate(const Clip& a, const Clip& b) {
   }
   const FootTracks reference = foot_tracks(a, *feet);
   const FootTracks judged = foot_tracks(b, other);
-  const Ground ground = estimate_ground(reference);
-  return SkateFigures{.foot_slide_cm_s = foot_slide_cm_s(judged, ContactModel::standard().detect(reference, ground)),
-                      .floor_penetration_cm = floor_penetration_cm(judged, ground)};
+  const FootLevel level = foot_level(reference);
+  const FootContacts contacts = ContactModel::standard().detect(reference, level.ground);
+  return SkateFigures{.foot_slide_cm_s = foot_slide_cm_s(judged, contacts),
+                      .floor_penetration_cm = floor_penetration_cm(judged, level.ground),
+                      .of_a = foot_motion(reference, level),
+                      .of_b = foot_motion(judged, level)};
 }
 
 }  // namespace kinespace

@@ -58,6 +58,7 @@ struct FootMotion {
 struct SkateFigures {
   std::optional<double> foot_slide_cm_s;  // nullopt: A has no planted foot
   double floor_penetration_cm = 0;
+  FootMotion of_a, of_b;  // over the ground and by the standing heights of A
 };
 
 // nullopt when either has no feet that can be told, or the frames differ.

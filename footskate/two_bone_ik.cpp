@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 // At right angles to the thigh: that of the bend where the knee is clearly bent to the hint's side, that of the hint
 // where it is straight or bent to the other side, and smoothly between.
 Vector3d bending_axis(const TwoBoneLimb& limb, const Vector3d& thigh, const Vector3d& hint) {
-  constexpr double clear = 0.1;  // sine of about 6 degrees
+  constexpr double clear = 0.5;  // the sine of 30 degrees
   const Vector3d bend = knee_bend(limb);
   const double side = std::clamp(bend.dot(hint) / clear, 0.0, 1.0);
   const double share = hint.isZero() ? 1 : side * side * (3 - 2 * side);

@@ -106,11 +106,14 @@ std::optional<PlannedTransition> plan_transition(LibraryView& library, std::span
 
   PlannedTransition out;
   std::vector<ClipCurves> pieces, group;
+  std::vector<std::optional<FootContacts>> contacts;  // of each piece, where the library keeps them
   for (std::size_t i = 0; i < way.clips.size(); ++i) {
     const ClipRow row = library.library().clip(way.clips[i]);
     out.clips.push_back(row.name);
     group.push_back(library.curves(row));
     if (i < way.kinds.size() && way.kinds[i] == Kind::neighbour) continue;
+    const auto feet = group.size() == 1 ? library.feet(row) : std::nullopt;
+    contacts.push_back(feet ? std::optional(feet->frames()) : std::nullopt);
     pieces.push_back(group.size() == 1 ? std::move(group.front()) : neighbours_as_one(motions, group, skeleton));
     out.pieces.push_back(pieces.back().name);
     group.clear();
@@ -118,7 +121,7 @@ std::optional<PlannedTransition> plan_transition(LibraryView& library, std::span
   if (pieces.size() == 1) {  // neighbours all the way: a blend, with nothing to join
     out.transition.clip = clip_from_curves(pieces.front(), skeleton);
   } else {
-    out.transition = make_transition(space, pieces, skeleton, options.join);
+    out.transition = make_transition(space, pieces, skeleton, options.join, contacts);
   }
   return out;
 }

@@ -1,7 +1,6 @@
 #include "kinespace/footskate/detail/leg_pose.h"
 
 #include <algorithm>
-#include <cstdlib>
 
 #include "kinespace/footskate/detail/knee_bends.h"
 #include "kinespace/footskate/two_bone_ik.h"
@@ -97,9 +96,7 @@ Vector3d mean_knee_axis(const Clip& clip, const Leg& leg) {
   return sum.norm() > 1e-9 ? sum.normalized() : Vector3d::Zero();
 }
 
-void pose_legs(Clip& clip, const Feet& feet, const LegGoals& told) {
-  LegGoals goals = told;
-  if (getenv("KS_GIVE") && goals.give_cm < 0.1) goals.give_cm = atof(getenv("KS_GIVE"));  // DEBUG
+void pose_legs(Clip& clip, const Feet& feet, const LegGoals& goals) {
   shift_root(clip, feet, goals.root_shift);
   std::array<LegPoser, 2> posers = {LegPoser(clip, feet.legs[0]), LegPoser(clip, feet.legs[1])};
   std::array<std::vector<LegWish>, 2> wishes;
