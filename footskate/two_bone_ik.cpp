@@ -11,13 +11,13 @@ using Eigen::AngleAxisd;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-// At right angles to the thigh: that of the bend where the knee is clearly bent to the hint's side, that of the hint
+// At right angles to the thigh: that of the bend where no hint is given or the knee is clearly bent to the hint's side, that of the hint
 // where it is straight or bent to the other side, and smoothly between.
 Vector3d bending_axis(const TwoBoneLimb& limb, const Vector3d& thigh, const Vector3d& hint) {
   constexpr double clear = 0.5;  // the sine of 30 degrees
   const Vector3d bend = knee_bend(limb);
   const double side = std::clamp(bend.dot(hint) / clear, 0.0, 1.0);
-  const double share = hint.isZero() ? 1 : side * side * (3 - 2 * side);
+  const double share = hint.isZero() ? 1.0 : side * side * (3 - 2 * side);
   const Vector3d axis = share > 0 ? Vector3d(share * bend.normalized() + (1 - share) * hint) : hint;
   const Vector3d across = axis - thigh * thigh.dot(axis);
   return across.norm() > 1e-12 ? across.normalized() : thigh.unitOrthogonal();

@@ -27,8 +27,8 @@ struct TwoBoneLimb {
 struct TwoBoneOptions {
   double soft_from = 0.99;  // share of the length, 0.5 to 1
   // The axis of the knee, world, unit length: used where the leg is so straight that its plane cannot be told, and for
-  // the side to which a knee bends (captured knees bend a little to the other side).
-  Eigen::Vector3d knee_axis = Eigen::Vector3d::UnitX();
+  // the side to which a knee bends (captured knees bend a little to the other side). Zero: not known.
+  Eigen::Vector3d knee_axis = Eigen::Vector3d::Zero();
 };
 
 // Rotations of the world to apply before those the joints have: new world rotation = thigh * old one.

@@ -176,7 +176,7 @@ class Joiner {
 
   // Room for the root and the feet to come back to the motions themselves; no seam reaches into its neighbour's.
   [[nodiscard]] Margins margins_of(const Join& join) const {
-    constexpr double before_s = 0.4, after_s = 1.5;
+    constexpr double before_s = 0.4, after_s = 1.0;
     const double rate = first_.sampler.rate_hz();
     const double before = std::clamp(join.connection.leave_s - least_leave_s_, 0.0, before_s);
     const double after = std::clamp(largest_entered_s_ - join.connection.entered_s, 0.0, after_s);
@@ -268,19 +268,6 @@ double badness(const Join& join) {
          0.3 * (join.stretch - 1);
 }
 
-GroundMotion placed(const Connection& connection, const OverlapClock& clock, double duration_s, const Source& first,
-                    const Source& second, const Skeleton& skeleton) {
-  constexpr int looks = 12;
-  std::array<double, looks> first_s{}, second_s{};
-  for (int i = 0; i < looks; ++i) {
-    const double overlap_s = duration_s * (i + 0.5) / looks;
-    first_s[static_cast<std::size_t>(i)] = clock.first_s(overlap_s);
-    second_s[static_cast<std::size_t>(i)] = clock.second_s(overlap_s);
-  }
-  static_cast<void>(connection);
-  return ground_alignment(first.sampler, first_s, second.sampler, second_s, skeleton);
-}
-
 Join blended_join(const Connection& connection, const Source& first, const Source& second, double stretch,
                   const Skeleton& skeleton) {
   // The second motion's frames shall be frames of the output where both have one rate: the overlap's length gives way.
@@ -289,8 +276,15 @@ Join blended_join(const Connection& connection, const Source& first, const Sourc
   const double steps = std::round((connection.leave_s + wanted - connection.entered_s) / step);
   const double duration = steps * step + connection.entered_s - connection.leave_s;
   Join join{.connection = connection, .duration_s = duration > step ? duration : duration + step, .stretch = stretch};
-  join.placement =
-      placed(connection, OverlapClock(connection, join.duration_s), join.duration_s, first, second, skeleton);
+  constexpr int looks = 12;
+  const OverlapClock clock(connection, join.duration_s);
+  std::array<double, looks> first_s{}, second_s{};
+  for (int i = 0; i < looks; ++i) {
+    const double overlap_s = join.duration_s * (i + 0.5) / looks;
+    first_s[static_cast<std::size_t>(i)] = clock.first_s(overlap_s);
+    second_s[static_cast<std::size_t>(i)] = clock.second_s(overlap_s);
+  }
+  join.placement = ground_alignment(first.sampler, first_s, second.sampler, second_s, skeleton);
   return join;
 }
 

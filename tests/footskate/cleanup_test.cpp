@@ -188,6 +188,38 @@ TEST(SkateMeasures, of_a_scaled_path_are_what_was_put_in) {
   EXPECT_NEAR(sunk->foot_slide_cm_s.value(), 0, 0.2);
 }
 
+// Feet on rails: the left ankle at a height and a speed, the others out of the way.
+FootTracks on_rails(double height_cm, double speed_cm_s) {
+  FootTracks out{.frames = 31, .rate_hz = 30};
+  for (int f = 0; f < out.frames; ++f) {
+    out.at[0].emplace_back(0, 8 + height_cm, f / out.rate_hz * speed_cm_s);
+    out.at[2].emplace_back(20, 60, 0);
+    out.root.emplace_back(0, 90, 0);
+  }
+  return out;
+}
+
+const FootLevel flat_floor{.ground = {}, .standing_cm = {8, 0, 8, 0}};
+
+TEST(SkateMeasures, count_feet_that_are_low_and_slow_by_geometry_alone) {
+  EXPECT_NEAR(foot_motion(on_rails(0, 10), flat_floor).slide_cm_s.value(), 10, 1e-9);
+  EXPECT_EQ(foot_motion(on_rails(0, 30), flat_floor).slide_cm_s, std::nullopt) << "a step, not a slide";
+  EXPECT_EQ(foot_motion(on_rails(6, 10), flat_floor).slide_cm_s, std::nullopt) << "in the air";
+  EXPECT_NEAR(foot_motion(on_rails(6, 10), flat_floor).lowest_speed_cm_s.value(), 10, 1e-9);
+  EXPECT_NEAR(foot_motion(on_rails(6, 10), flat_floor).hover_cm, 6, 1e-9);
+  EXPECT_NEAR(foot_motion(on_rails(-9, 10), flat_floor).penetration_cm, 1, 1e-9);
+  EXPECT_EQ(foot_motion(on_rails(0, 10), flat_floor, 5, 5).lowest_speed_cm_s, std::nullopt) << "one frame has no speed";
+}
+
+TEST(SkateMeasures, by_geometry_see_what_a_scaled_path_does) {
+  const SampleMotion walk = make_walk({.duration_s = 5, .take = {.variation = 0}});
+  const auto skate = compare_skate(walk.clip, test::with_path_scaled(walk.clip, 0.9));
+  ASSERT_TRUE(skate);
+  EXPECT_LT(skate->of_a.slide_cm_s.value(), 6);
+  EXPECT_GT(skate->of_b.slide_cm_s.value(), 10);
+  EXPECT_GT(skate->of_b.lowest_speed_cm_s.value(), skate->of_a.lowest_speed_cm_s.value() + 5);
+}
+
 TEST(SkateMeasures, pose_change_does_not_count_travel_and_turn) {
   const Clip walk = make_walk().clip;
   EXPECT_NEAR(mean_pose_change_cm(walk, test::with_path_scaled(walk, 1.3)), 0, 1e-9);
