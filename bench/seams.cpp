@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 #include <random>
+#include <span>
 #include <vector>
 
-#include "kinespace/base/parallel.h"
 #include "kinespace/motion/kinematics.h"
-#include <cstdio>
-#include <cstdlib>
 #include "kinespace/footskate/skate_measures.h"
 #include "kinespace/synthesis/connection.h"
+#include "kinespace/synthesis/curve_sampler.h"
 #include "kinespace/synthesis/transition.h"
 
 namespace kinespace {
@@ -77,6 +77,73 @@ Seam measured(const Sources& sources, const Transition& made) {
   return out;
 }
 
+// Where two poses and what they do are most alike: what a transition that is found by comparing frames begins with.
+struct BestPoint {
+  double leave_s = 0, enter_s = 0;
+};
+
+// Every frame of the last two seconds of one (at most its half) with every one of the first two of the other: the mean
+// distance of joints seen from the root on the ground, and a tenth of a second of their difference in speed.
+BestPoint best_point(const ClipCurves& first, const ClipCurves& second, const Skeleton& skeleton) {
+  constexpr double window_s = 2, lead_s = 0.1, overlap_s = 0.3;
+  const auto poses = [&](const ClipCurves& curves) {
+    JointPositions positions = joint_positions(clip_from_curves(curves, skeleton));
+    const int root = skeleton.travel_root();
+    for (int f = 0; f < positions.frames; ++f) {
+      const auto q = curves.values.row(f).segment<4>(travel_curves);
+      const double heading = heading_of(Eigen::Quaterniond(q(0), q(1), q(2), q(3))) + curves.placement.heading_rad;
+      const Eigen::Vector3d at = positions.at(f, root);
+      const Eigen::AngleAxisd back(-heading, Eigen::Vector3d::UnitY());
+      for (int j = 0; j < positions.joints; ++j) {
+        Eigen::Vector3d& p = positions.values[static_cast<std::size_t>(f * positions.joints + j)];
+        p = back * (p - Eigen::Vector3d(at.x(), 0, at.z()));
+      }
+    }
+    return positions;
+  };
+  const JointPositions a = poses(first), b = poses(second);
+  const auto steps = [](int frames, double rate_hz) { return std::min(frames / 2, static_cast<int>(window_s * rate_hz)); };
+  const int from = std::max(1, a.frames - steps(a.frames, first.rate_hz));
+  const int to_a = a.frames - static_cast<int>(overlap_s * first.rate_hz) - 1;
+  const int to_b = std::min(steps(b.frames, second.rate_hz), b.frames - static_cast<int>(overlap_s * second.rate_hz) - 1);
+  double least = std::numeric_limits<double>::infinity();
+  BestPoint out{.leave_s = std::max(0, to_a) / first.rate_hz, .enter_s = 1 / second.rate_hz};
+  for (int f = from; f <= to_a; ++f) {
+    for (int g = 1; g <= to_b; ++g) {
+      double sum = 0;
+      for (int j = 0; j < a.joints && sum < least; ++j) {
+        const Eigen::Vector3d apart = a.at(f, j) - b.at(g, j);
+        const Eigen::Vector3d speeds = (a.at(f, j) - a.at(f - 1, j)) * first.rate_hz - (b.at(g, j) - b.at(g - 1, j)) * second.rate_hz;
+        sum += apart.norm() + lead_s * speeds.norm();
+      }
+      if (sum >= least) continue;
+      least = sum;
+      out = {f / first.rate_hz, g / second.rate_hz};
+    }
+  }
+  return out;
+}
+
+// What others do at their best point: a crossfade of 0.3 s, or inertialization over 0.5 s.
+Transition at_best_point(const BestPoint& point, JoinWay way, const std::vector<ClipCurves>& clips,
+                         const Skeleton& skeleton) {
+  const double end_s = (clips[1].frames() - 1) / clips[1].rate_hz;
+  Join join{.way = way, .duration_s = std::min(way == JoinWay::blend ? 0.3 : 0.5, end_s - point.enter_s)};
+  join.connection.leave_s = point.leave_s;
+  join.connection.left_s = point.leave_s + join.duration_s;
+  join.connection.enter_s = point.enter_s;
+  join.connection.entered_s = point.enter_s + join.duration_s;
+  const auto at_world_height = [](ClipCurves curves) {
+    curves.values.col(1).array() += curves.placement.start_cm.y() / 100;
+    curves.placement.start_cm.y() = 0;
+    return curves;
+  };
+  const std::array<double, 1> first_s{point.leave_s}, second_s{point.enter_s};
+  join.placement = ground_alignment(CurveSampler(at_world_height(clips[0])), first_s,
+                                    CurveSampler(at_world_height(clips[1])), second_s, skeleton);
+  return play_joins(clips, std::span(&join, 1), skeleton);
+}
+
 double quantile(std::vector<double> values, double share) {
   if (values.empty()) return std::nan("");
   const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
@@ -137,6 +204,25 @@ void rows_of(const std::string& data, const std::string& way, const std::vector<
   row("time scale within 0.8 and 1.25", 100 * natural / static_cast<double>(seams.size()), "%", 95, true);
 }
 
+// Ours over theirs: of the medians and of the 90th percentiles.
+void against(const std::string& data, const std::string& whose, const std::vector<Seam>& ours,
+             const std::vector<Seam>& theirs, BenchReport& report) {
+  const auto slide = [](const Seam& s) { return s.feet.slide_cm_s; };
+  const auto acceleration = [](const Seam& s) { return std::optional(s.ratios.acceleration); };
+  for (const double share : {0.5, 0.9}) {
+    const std::string at = share < 0.6 ? ", median" : ", 90 %";
+    const auto row = [&](const std::string& name, const auto& get) {
+      report.results.push_back({.name = "seam, transition: " + name + " over " + whose + at,
+                                .data = data,
+                                .value = quantile(values_of(ours, get), share) / quantile(values_of(theirs, get), share),
+                                .unit = "x",
+                                .bar = 1.0});
+    };
+    row("foot slide", slide);
+    row("joint acceleration", acceleration);
+  }
+}
+
 }  // namespace
 
 void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) {
@@ -149,7 +235,7 @@ void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) 
     }
   }
   std::mt19937_64 random(2026);
-  std::vector<Seam> seams;
+  std::vector<Seam> seams, crossfades, inertialized;
   for (int i = 0; i < pairs_tried; ++i) {
     const ClipRow& first = rows[random() % rows.size()];
     const ClipRow& second = rows[random() % rows.size()];
@@ -157,16 +243,15 @@ void seam_rows(const std::string& data, LibraryView& view, BenchReport& report) 
     const Skeleton& skeleton = view.skeleton(first.skeleton_id);
     const Transition made = make_transition(space, sources.clips, skeleton);
     seams.push_back(measured(sources, made));
-    if (getenv("KS_DEBUG")) {  // DEBUG
-      const Join& j = made.joins[0];
-      const JointPositions p = joint_positions(made.clip);
-      double worst = 0; int wf = 0, wj = 0;
-      const int from = std::max(1, int((made.begin[0] - .25) * made.clip.rate_hz)), to = std::min(made.clip.frames - 2, int((made.begin[0] + j.duration_s + .25) * made.clip.rate_hz));
-      for (int f = from; f <= to; ++f) for (int k = 0; k < p.joints; ++k) { const double a = (p.at(f+1,k) - 2*p.at(f,k) + p.at(f-1,k)).norm(); if (a > worst) { worst = a; wf = f; wj = k; } }
-      fprintf(stderr, "%d %s>%s way %d fp %d dur %.2f speed %.2f cost %.1f | est s %.2f a %.2f r %.2f | got s %.2f a %.2f r %.2f slide %.1f/%.1f low %.1f/%.1f pen %.1f | joint %s frame %d of %d..%d rate %.0f\n", i, first.name.c_str(), second.name.c_str(), int(j.way), int(j.feet_planned), j.duration_s, j.connection.speed(), j.connection.cost_cm, j.ratios.speed, j.ratios.acceleration, j.ratios.root_acceleration, seams.back().ratios.speed, seams.back().ratios.acceleration, seams.back().ratios.root_acceleration, seams.back().feet.slide_cm_s.value_or(-1), sources.slide.value_or(-1), seams.back().feet.lowest_speed_cm_s.value_or(-1), sources.lowest.value_or(-1), seams.back().feet.penetration_cm, skeleton.joints[wj].name.c_str(), wf, int(made.begin[0]*made.clip.rate_hz), int((made.begin[0]+j.duration_s)*made.clip.rate_hz), made.clip.rate_hz);
-    }
+    const BestPoint point = best_point(sources.clips[0], sources.clips[1], skeleton);
+    crossfades.push_back(measured(sources, at_best_point(point, JoinWay::blend, sources.clips, skeleton)));
+    inertialized.push_back(measured(sources, at_best_point(point, JoinWay::inertialization, sources.clips, skeleton)));
   }
   rows_of(data, "transition", seams, true, report);
+  rows_of(data, "crossfade of 0.3 s at the best point", crossfades, false, report);
+  rows_of(data, "inertialization at the best point", inertialized, false, report);
+  against(data, "the crossfade's", seams, crossfades, report);
+  against(data, "inertialization's", seams, inertialized, report);
 }
 
 }  // namespace kinespace

@@ -422,6 +422,113 @@ GroundMotion compose(const GroundMotion& outer, const GroundMotion& inner) {
           outer.z_m - s * inner.x_m + c * inner.z_m};
 }
 
+// The motions that are joined, in their order.
+struct Cast {
+  Cast(std::span<const ClipCurves> of_clips, const Skeleton& of_skeleton,
+       std::span<const std::optional<FootContacts>> contacts, bool plan_feet)
+      : clips(of_clips), skeleton(of_skeleton) {
+    sources.reserve(clips.size());
+    for (std::size_t i = 0; i < clips.size(); ++i) {
+      sources.emplace_back(clips[i], skeleton, i < contacts.size() ? contacts[i] : std::nullopt, plan_feet);
+    }
+  }
+
+  // Of motion i and the next. A motion is entered in its first half and left in its second.
+  [[nodiscard]] Joiner joiner(std::size_t i) const {
+    const double length = sources[i + 1].sampler.duration_s();
+    return {sources[i], sources[i + 1], skeleton, i == 0 ? 0 : sources[i].sampler.duration_s() / 2,
+            i + 2 == clips.size() ? length : length / 2};
+  }
+
+  std::span<const ClipCurves> clips;
+  const Skeleton& skeleton;
+  std::vector<Source> sources;
+};
+
+// The whole of it, played.
+class Film {
+ public:
+  Film(const Cast& cast, std::span<const Join> joins) : cast_(cast) {
+    out_.joins.assign(joins.begin(), joins.end());
+    for (const Join& join : joins) {
+      out_.begin.push_back(offsets_.back() + join.connection.leave_s);
+      offsets_.push_back(out_.begin.back() + join.duration_s - join.connection.entered_s);
+      placements_.push_back(compose(placements_.back(), join.placement));
+    }
+  }
+
+  Transition play() {
+    const double rate = cast_.clips[0].rate_hz;
+    const double end_s = offsets_.back() + cast_.sources.back().sampler.duration_s();
+    const int frames = static_cast<int>(std::floor(end_s * rate + rounding)) + 1;
+    ClipCurves curves{.name = cast_.clips.front().name,
+                      .rate_hz = rate,
+                      .placement = cast_.clips[0].placement,
+                      .values = SampleMatrix(frames, cast_.sources[0].sampler.curves())};
+    curves.placement.start_cm.y() = 0;
+    const auto parts = play_motions(curves);
+    for (std::size_t i = 0; i < out_.joins.size(); ++i) put_planned_feet(i, curves);
+    keep_sides(curves.values);
+    curves.side_tracks = blend_side_tracks(cast_.clips, parts, cast_.skeleton);
+    for (const ClipCurves& clip : cast_.clips.subspan(1)) curves.name += "+" + clip.name;
+    out_.clip = clip_from_curves(curves, cast_.skeleton);
+    return std::move(out_);
+  }
+
+ private:
+  static constexpr double rounding = 1e-6;  // of a frame
+
+  // Without any planned feet; returns what each frame is made of.
+  std::vector<std::vector<FramePart>> play_motions(ClipCurves& curves) const {
+    std::vector<std::vector<FramePart>> parts;
+    Eigen::RowVectorXd pose(curves.values.cols());
+    std::size_t at = 0;  // the motion that plays, or that is being left
+    std::optional<JoinedPair> pair;
+    for (int f = 0; f < curves.frames(); ++f) {
+      const double t = f / curves.rate_hz;
+      while (at < out_.joins.size() && t >= out_.begin[at] + out_.joins[at].duration_s) {
+        pair.reset();
+        ++at;
+      }
+      if (at < out_.joins.size() && t > out_.begin[at]) {
+        if (!pair) pair.emplace(cast_.sources[at].sampler, cast_.sources[at + 1].sampler, out_.joins[at]);
+        const auto shares = pair->at(t - out_.begin[at], pose);
+        parts.push_back({{at, shares.first_s, 1 - shares.second}, {at + 1, shares.second_s, shares.second}});
+      } else {
+        // Where a frame is a frame of the motion, it is that frame to the last bit.
+        const CurveSampler& sampler = cast_.sources[at].sampler;
+        const double own = (t - offsets_[at]) * sampler.rate_hz();
+        const double nearest = std::round(own);
+        const double own_s = (std::abs(own - nearest) < rounding ? nearest : own) / sampler.rate_hz();
+        sampler.at(own_s, pose);
+        parts.push_back({{at, own_s, 1}});
+      }
+      placements_[at].apply(pose);
+      curves.values.row(f) = pose;
+    }
+    return parts;
+  }
+
+  void put_planned_feet(std::size_t i, ClipCurves& curves) const {
+    if (!out_.joins[i].feet_planned) return;
+    const int first_inside = static_cast<int>(std::ceil(out_.begin[i] * curves.rate_hz - rounding));
+    const auto seam = cast_.joiner(i).seam_of(out_.joins[i], first_inside / curves.rate_hz - out_.begin[i], true);
+    Eigen::RowVectorXd pose(curves.values.cols());
+    for (int f = 0; f < seam.curves.frames(); ++f) {
+      const int to = first_inside + f - seam.begin;
+      if (to < 0 || to >= curves.frames()) continue;
+      pose = seam.curves.values.row(f);
+      placements_[i].apply(pose);
+      curves.values.row(to) = pose;
+    }
+  }
+
+  const Cast& cast_;
+  Transition out_;
+  std::vector<double> offsets_{0};  // the output's time less each motion's own
+  std::vector<GroundMotion> placements_{{}};
+};
+
 }  // namespace
 
 std::string_view to_string(JoinWay way) {
@@ -458,6 +565,16 @@ GroundMotion ground_alignment(const CurveSampler& first, std::span<const double>
           (mean_a.z() - (-s * mean_b.x() + c * mean_b.z())) / cm_per_m};
 }
 
+Transition play_joins(std::span<const ClipCurves> clips, std::span<const Join> joins, const Skeleton& skeleton,
+                      std::span<const std::optional<FootContacts>> contacts) {
+  if (clips.empty() || joins.size() + 1 != clips.size()) {
+    throw Error(ErrorKind::usage, {.found = fmt::format("{} joins for {} clips", joins.size(), clips.size()),
+                                   .expected = "one between each two clips"});
+  }
+  const Cast cast(clips, skeleton, contacts, std::ranges::any_of(joins, &Join::feet_planned));
+  return Film(cast, joins).play();
+}
+
 Transition make_transition(const ConnectionSpace& space, std::span<const ClipCurves> clips, const Skeleton& skeleton,
                            const TransitionOptions& options,
                            std::span<const std::optional<FootContacts>> contacts) {
@@ -465,86 +582,19 @@ Transition make_transition(const ConnectionSpace& space, std::span<const ClipCur
   if (clips.size() < 2) {
     throw Error(ErrorKind::usage, {.found = fmt::format("{} clip", clips.size()), .expected = "two clips or more"});
   }
-  std::vector<Source> sources;
-  sources.reserve(clips.size());
-  for (std::size_t i = 0; i < clips.size(); ++i) {
-    sources.emplace_back(clips[i], skeleton, i < contacts.size() ? contacts[i] : std::nullopt, options.plan_feet);
-  }
-  // A motion is entered in its first half and left in its second.
-  const auto joiner_at = [&](std::size_t i) {
-    const double half = sources[i + 1].sampler.duration_s() / 2;
-    return Joiner(sources[i], sources[i + 1], skeleton, i == 0 ? 0 : sources[i].sampler.duration_s() / 2,
-                  i + 2 == clips.size() ? 2 * half : half);
-  };
-
-  Transition out;
-  std::vector<double> offsets{0};  // the output's time less each motion's own
-  std::vector<GroundMotion> placements{{}};
+  const Cast cast(clips, skeleton, contacts, options.plan_feet);
+  std::vector<Join> joins;
   for (std::size_t i = 0; i + 1 < clips.size(); ++i) {
-    auto join = best_join(space, space.end_of(clips[i]), space.start_of(clips[i + 1]), sources[i], sources[i + 1],
-                          skeleton, joiner_at(i), options);
+    const auto join = best_join(space, space.end_of(clips[i]), space.start_of(clips[i + 1]), cast.sources[i],
+                                cast.sources[i + 1], skeleton, cast.joiner(i), options);
     if (!join) {
       throw Error(ErrorKind::bad_input, {.found = fmt::format("no way from {} to {} within the legal speeds",
                                                               clips[i].name, clips[i + 1].name),
                                          .expected = "clips whose ends and starts last at least the smallest overlap"});
     }
-    out.begin.push_back(offsets.back() + join->connection.leave_s);
-    offsets.push_back(out.begin.back() + join->duration_s - join->connection.entered_s);
-    placements.push_back(compose(placements.back(), join->placement));
-    out.joins.push_back(*join);
+    joins.push_back(*join);
   }
-
-  const double rate = clips[0].rate_hz;
-  const double end_s = offsets.back() + sources.back().sampler.duration_s();
-  constexpr double rounding = 1e-6;  // of a frame
-  const int frames = static_cast<int>(std::floor(end_s * rate + rounding)) + 1;
-  ClipCurves curves{.name = clips.front().name,
-                    .rate_hz = rate,
-                    .placement = clips[0].placement,
-                    .values = SampleMatrix(frames, sources[0].sampler.curves())};
-  curves.placement.start_cm.y() = 0;
-  std::vector<std::vector<FramePart>> parts;
-  Eigen::RowVectorXd pose(curves.values.cols());
-  std::size_t at = 0;  // the motion that plays, or that is being left
-  std::optional<JoinedPair> pair;
-  for (int f = 0; f < frames; ++f) {
-    const double t = f / rate;
-    while (at < out.joins.size() && t >= out.begin[at] + out.joins[at].duration_s) {
-      pair.reset();
-      ++at;
-    }
-    if (at < out.joins.size() && t > out.begin[at]) {
-      if (!pair) pair.emplace(sources[at].sampler, sources[at + 1].sampler, out.joins[at]);
-      const auto shares = pair->at(t - out.begin[at], pose);
-      parts.push_back({{at, shares.first_s, 1 - shares.second}, {at + 1, shares.second_s, shares.second}});
-    } else {
-      // Where a frame is a frame of the motion, it is that frame to the last bit.
-      const double own = (t - offsets[at]) * sources[at].sampler.rate_hz();
-      const double nearest = std::round(own);
-      const double own_s = (std::abs(own - nearest) < rounding ? nearest : own) / sources[at].sampler.rate_hz();
-      sources[at].sampler.at(own_s, pose);
-      parts.push_back({{at, own_s, 1}});
-    }
-    placements[at].apply(pose);
-    curves.values.row(f) = pose;
-  }
-  for (std::size_t i = 0; i < out.joins.size(); ++i) {
-    if (!out.joins[i].feet_planned) continue;
-    const int first_inside = static_cast<int>(std::ceil(out.begin[i] * rate - rounding));
-    const auto seam = joiner_at(i).seam_of(out.joins[i], first_inside / rate - out.begin[i], true);
-    for (int f = 0; f < seam.curves.frames(); ++f) {
-      const int to = first_inside + f - seam.begin;
-      if (to < 0 || to >= frames) continue;
-      pose = seam.curves.values.row(f);
-      placements[i].apply(pose);
-      curves.values.row(to) = pose;
-    }
-  }
-  keep_sides(curves.values);
-  curves.side_tracks = blend_side_tracks(clips, parts, skeleton);
-  for (const ClipCurves& clip : clips.subspan(1)) curves.name += "+" + clip.name;
-  out.clip = clip_from_curves(curves, skeleton);
-  return out;
+  return Film(cast, joins).play();
 }
 
 }  // namespace kinespace

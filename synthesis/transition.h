@@ -76,6 +76,12 @@ struct Transition {
                                             const CurveSampler& second, std::span<const double> second_s,
                                             const Skeleton& skeleton);
 
+// Plays the clips joined as said, one join between each two: what make_transition does once it has chosen. Of a join its
+// connection, way, placement, duration, pace and feet_planned are looked at.
+[[nodiscard]] Transition play_joins(std::span<const ClipCurves> clips, std::span<const Join> joins,
+                                    const Skeleton& skeleton,
+                                    std::span<const std::optional<FootContacts>> contacts = {});
+
 // Joins clips in their order. Curves must be on the space's side (LibraryView gives them so). `contacts` are when the feet
 // of each clip stand, where that is known (KeptFeet::frames); else they are found (footskate/contact_model.h). Throws Error{usage} for
 // fewer than two clips and Error{bad_input} naming a clip that is too short to be left or entered.
