@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "kinespace/motion/kinematics.h"
 #include "kinespace/footskate/skate_measures.h"
+#include "kinespace/motion/kinematics.h"
 #include "kinespace/synthesis/connection.h"
 #include "kinespace/synthesis/curve_sampler.h"
 #include "kinespace/synthesis/transition.h"
@@ -102,10 +102,13 @@ BestPoint best_point(const ClipCurves& first, const ClipCurves& second, const Sk
     return positions;
   };
   const JointPositions a = poses(first), b = poses(second);
-  const auto steps = [](int frames, double rate_hz) { return std::min(frames / 2, static_cast<int>(window_s * rate_hz)); };
+  const auto steps = [](int frames, double rate_hz) {
+    return std::min(frames / 2, static_cast<int>(window_s * rate_hz));
+  };
   const int from = std::max(1, a.frames - steps(a.frames, first.rate_hz));
   const int to_a = a.frames - static_cast<int>(overlap_s * first.rate_hz) - 1;
-  const int to_b = std::min(steps(b.frames, second.rate_hz), b.frames - static_cast<int>(overlap_s * second.rate_hz) - 1);
+  const int to_b =
+      std::min(steps(b.frames, second.rate_hz), b.frames - static_cast<int>(overlap_s * second.rate_hz) - 1);
   double least = std::numeric_limits<double>::infinity();
   BestPoint out{.leave_s = std::max(0, to_a) / first.rate_hz, .enter_s = 1 / second.rate_hz};
   for (int f = from; f <= to_a; ++f) {
@@ -113,7 +116,8 @@ BestPoint best_point(const ClipCurves& first, const ClipCurves& second, const Sk
       double sum = 0;
       for (int j = 0; j < a.joints && sum < least; ++j) {
         const Eigen::Vector3d apart = a.at(f, j) - b.at(g, j);
-        const Eigen::Vector3d speeds = (a.at(f, j) - a.at(f - 1, j)) * first.rate_hz - (b.at(g, j) - b.at(g - 1, j)) * second.rate_hz;
+        const Eigen::Vector3d speeds =
+            (a.at(f, j) - a.at(f - 1, j)) * first.rate_hz - (b.at(g, j) - b.at(g - 1, j)) * second.rate_hz;
         sum += apart.norm() + lead_s * speeds.norm();
       }
       if (sum >= least) continue;
@@ -212,11 +216,12 @@ void against(const std::string& data, const std::string& whose, const std::vecto
   for (const double share : {0.5, 0.9}) {
     const std::string at = share < 0.6 ? ", median" : ", 90 %";
     const auto row = [&](const std::string& name, const auto& get) {
-      report.results.push_back({.name = "seam, transition: " + name + " over " + whose + at,
-                                .data = data,
-                                .value = quantile(values_of(ours, get), share) / quantile(values_of(theirs, get), share),
-                                .unit = "x",
-                                .bar = 1.0});
+      report.results.push_back(
+          {.name = "seam, transition: " + name + " over " + whose + at,
+           .data = data,
+           .value = quantile(values_of(ours, get), share) / quantile(values_of(theirs, get), share),
+           .unit = "x",
+           .bar = 1.0});
     };
     row("foot slide", slide);
     row("joint acceleration", acceleration);

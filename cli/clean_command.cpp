@@ -94,7 +94,8 @@ void add_clean(CLI::App& app, Session& session) {
   command->add_option("--floor", options->floor_cm, "The floor is flat at this height in cm; estimated otherwise");
   command->add_option("--library", options->library, "Use the contact labels of this library (kinespace contacts)");
   command->add_option("--picture", options->picture, "Also write stick figures with the plants marked, .svg");
-  command->add_flag("--strict", options->strict, "A result that is worse than its input is an error: nothing is written");
+  command->add_flag("--strict", options->strict,
+                    "A result that is worse than its input is an error: nothing is written");
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
   session.files.reads(command, {"IN", "--library"});
   session.files.writes(command, {"--output"});

@@ -4,7 +4,8 @@ namespace kinespace::cli {
 
 Json foot_figures(const std::optional<FootMotion>& motion) {
   if (!motion) {
-    return {{"slide_cm_s", nullptr}, {"lowest_speed_cm_s", nullptr}, {"penetration_cm", nullptr}, {"hover_cm", nullptr}};
+    return {
+        {"slide_cm_s", nullptr}, {"lowest_speed_cm_s", nullptr}, {"penetration_cm", nullptr}, {"hover_cm", nullptr}};
   }
   return {{"slide_cm_s", or_null(motion->slide_cm_s)},
           {"lowest_speed_cm_s", or_null(motion->lowest_speed_cm_s)},

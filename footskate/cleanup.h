@@ -43,9 +43,9 @@ struct CleanReport {
   double floor_penetration_cm =
       0;  // after: the deepest joint; uneven ground: below the lower of its plants before and after
   FootMotion feet_before, feet_after;  // by geometry alone, over the ground and the standing heights of the input
-  double mean_pose_change_cm = 0;  // footskate/skate_measures.h
-  double largest_move_cm = 0;      // of any joint, world
-  double acceleration_ratio = 1;   // the largest of any joint, after over before; 1 where nothing moves
+  double mean_pose_change_cm = 0;      // footskate/skate_measures.h
+  double largest_move_cm = 0;          // of any joint, world
+  double acceleration_ratio = 1;       // the largest of any joint, after over before; 1 where nothing moves
   int passes = 0;
 };
 

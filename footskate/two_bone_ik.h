@@ -46,8 +46,8 @@ struct TwoBoneTurn {
 struct KneeHinge {
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  // world, unit length, at right angles to the thigh
   double thigh = 0, shin = 0;                       // cm
-  double share = 1;  // of the shin that lies in the plane; 1 for a hinge
-  double bend = 0;   // now, radians; 0: straight, < 0: bent to the other side
+  double share = 1;                                 // of the shin that lies in the plane; 1 for a hinge
+  double bend = 0;                                  // now, radians; 0: straight, < 0: bent to the other side
 
   [[nodiscard]] double reach(double at_bend) const;
   // The bend >= 0 at which the leg reaches so far, or as near to it as it comes.

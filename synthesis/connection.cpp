@@ -318,7 +318,8 @@ std::optional<Connection> ConnectionSpace::connect(const ConnectionMotion& first
   if (minima.empty()) return std::nullopt;
   constexpr double worth_looking = 1.4;
   const double least = minima.front().cost;
-  if (std::isfinite(least) && 100 * std::sqrt(std::max(least, 0.0)) > worth_looking * limits.give_up_cm) return std::nullopt;
+  if (std::isfinite(least) && 100 * std::sqrt(std::max(least, 0.0)) > worth_looking * limits.give_up_cm)
+    return std::nullopt;
 
   RefinedConnection best;
   int evaluations = 0;

@@ -245,8 +245,8 @@ class Joiner {
   const Source& first_;
   const Source& second_;
   const Skeleton& skeleton_;
-  double least_leave_s_;       // from there on the first motion may change
-  double largest_entered_s_;   // up to there the second
+  double least_leave_s_;      // from there on the first motion may change
+  double largest_entered_s_;  // up to there the second
 };
 
 // How much worse a joined motion is than its sources: 0 where nothing can be seen.
@@ -341,9 +341,7 @@ class BestJoin {
     }
   }
 
-  [[nodiscard]] std::optional<Join> best() const {
-    return best_ ? std::optional(tried_[*best_].second) : std::nullopt;
-  }
+  [[nodiscard]] std::optional<Join> best() const { return best_ ? std::optional(tried_[*best_].second) : std::nullopt; }
 
  private:
   const Joiner& joiner_;
@@ -576,8 +574,7 @@ Transition play_joins(std::span<const ClipCurves> clips, std::span<const Join> j
 }
 
 Transition make_transition(const ConnectionSpace& space, std::span<const ClipCurves> clips, const Skeleton& skeleton,
-                           const TransitionOptions& options,
-                           std::span<const std::optional<FootContacts>> contacts) {
+                           const TransitionOptions& options, std::span<const std::optional<FootContacts>> contacts) {
   options.validate();
   if (clips.size() < 2) {
     throw Error(ErrorKind::usage, {.found = fmt::format("{} clip", clips.size()), .expected = "two clips or more"});

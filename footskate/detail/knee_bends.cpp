@@ -43,7 +43,11 @@ void solve_band(Band& band, std::vector<double>& right) {
 class Run {
  public:
   Run(const std::vector<LegWish>& wishes, std::size_t first, std::size_t last, double rate_hz, double give_cm)
-      : wishes_(wishes), first_(first), count_(last - first), give_cm_(give_cm), stiff_(std::pow(rate_hz, 4) / (jerk_rad_s2 * jerk_rad_s2)) {
+      : wishes_(wishes),
+        first_(first),
+        count_(last - first),
+        give_cm_(give_cm),
+        stiff_(std::pow(rate_hz, 4) / (jerk_rad_s2 * jerk_rad_s2)) {
     for (std::size_t i = 0; i < count_; ++i) {
       const LegWish& leg = wishes_[first_ + i];
       change_.push_back(leg.hinge.bend_for(leg.reach) - leg.hinge.bend);
@@ -79,7 +83,9 @@ class Run {
         if (row < 0 || row >= static_cast<std::ptrdiff_t>(count_)) continue;
         for (int b = 0; b <= a; ++b) {
           const std::ptrdiff_t column = centre - 1 + b;
-          if (column >= 0) band[static_cast<std::size_t>(row)][static_cast<std::size_t>(2 - (a - b))] += stiff_ * second[a] * second[b];
+          if (column >= 0)
+            band[static_cast<std::size_t>(row)][static_cast<std::size_t>(2 - (a - b))] +=
+                stiff_ * second[a] * second[b];
         }
       }
     }

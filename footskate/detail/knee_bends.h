@@ -16,8 +16,8 @@
 namespace kinespace {
 
 struct LegWish {
-  KneeHinge hinge;      // as the leg is
-  double reach = 0;     // as it shall be, cm
+  KneeHinge hinge;       // as the leg is
+  double reach = 0;      // as it shall be, cm
   bool changes = false;  // false: the leg stays as it is, whatever is wished
 };
 

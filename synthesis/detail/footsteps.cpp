@@ -12,11 +12,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double held_cm = 2.5;       // a foot whose places are no farther apart stays where it is
-constexpr double step_base_s = 0.2;   // how long a step takes, and how much longer for its way
+constexpr double held_cm = 2.5;      // a foot whose places are no farther apart stays where it is
+constexpr double step_base_s = 0.2;  // how long a step takes, and how much longer for its way
 constexpr double step_cm_s = 250;
 constexpr double longest_step_s = 0.35;
-constexpr double settle_s = 0.5;      // in which a held foot's offset goes after its stance
+constexpr double settle_s = 0.5;  // in which a held foot's offset goes after its stance
 
 double eased(double x) {
   x = std::clamp(x, 0.0, 1.0);
@@ -217,9 +217,9 @@ Footsteps plan_footsteps(const SeamFeet& feet, double pace) {
 void take_footsteps(Clip& blend, const FootTracks& tracks, const Ground& ground, const SeamFeet& feet,
                     const Footsteps& plan) {
   const auto ankles = ankles_of(blend, tracks.feet);
-  GuidedFeet guide{.tasks = {LegTask(feet, 0, plan.legs[0], ankles[0]).make(),
-                             LegTask(feet, 1, plan.legs[1], ankles[1]).make()},
-                   .root_share = {}};
+  GuidedFeet guide{
+      .tasks = {LegTask(feet, 0, plan.legs[0], ankles[0]).make(), LegTask(feet, 1, plan.legs[1], ankles[1]).make()},
+      .root_share = {}};
   // The root is at home at both ends of what is looked at.
   for (int f = 0; f < feet.frames; ++f) {
     const double before = f < feet.begin ? static_cast<double>(f) / feet.begin : 1;

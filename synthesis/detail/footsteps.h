@@ -33,10 +33,10 @@ struct SeamFeet {
 };
 
 struct LegSteps {
-  int last_of_first = -1;    // the last frame that is given by the first motion
-  int first_of_second = 0;   // the first that is given by the second
-  bool held = false;         // it stands all the time between
-  double way_cm = 0;         // along the ground between these two
+  int last_of_first = -1;   // the last frame that is given by the first motion
+  int first_of_second = 0;  // the first that is given by the second
+  bool held = false;        // it stands all the time between
+  double way_cm = 0;        // along the ground between these two
 };
 
 struct Footsteps {

@@ -39,8 +39,23 @@ TEST_F(FeetCommands, clean_takes_skate_out_and_prints_its_keys) {
                           "ground", "floor_cm", "left_ankle", "right_ankle"}) {
     EXPECT_TRUE(report.contains(key)) << key;
   }
+  EXPECT_LT(report["feet_after"]["slide_cm_s"], report["feet_before"]["slide_cm_s"]);
   EXPECT_EQ(read_clip(folder_ / "clean.bvh").frames, report["frames"]);
   EXPECT_NE(read_text(folder_ / "clean.svg").find("<svg"), std::string::npos);
+}
+
+// A clip in which no foot stands: nothing can be said, so --strict does not take it for good.
+TEST_F(FeetCommands, clean_that_is_strict_writes_nothing_that_it_doubts) {
+  const SampleMotion walk = make_walk({.duration_s = 2});
+  Clip flying = walk.clip;
+  auto& track = flying.require_translation_track(flying.skeleton.travel_root()).values;
+  for (std::size_t f = 0; f < track.size(); ++f) track[f].y() += 3.0 * static_cast<double>(f);
+  write_clip(folder_ / "flying.bvh", flying);
+  EXPECT_EQ(run_command({"clean", path("flying.bvh"), "-o", path("plain.bvh")}).code, 0);
+  const CommandResult strict = run_command({"clean", path("flying.bvh"), "-o", path("strict.bvh"), "--strict"});
+  EXPECT_EQ(strict.code, 1);
+  EXPECT_NE(strict.err.find("--strict"), std::string::npos) << strict.err;
+  EXPECT_FALSE(std::filesystem::exists(path("strict.bvh")));
 }
 
 TEST_F(FeetCommands, clean_takes_named_feet_and_refuses_names_that_are_not_there) {
@@ -69,6 +84,10 @@ TEST_F(FeetCommands, compare_tells_the_slide_and_null_without_feet) {
   const json snake = json::parse(run_command({"compare", path("snake.bvh"), path("snake.bvh"), "--json"}).out);
   EXPECT_TRUE(snake["foot_slide_cm_s"].is_null());
   EXPECT_TRUE(snake["floor_penetration_cm"].is_null());
+  EXPECT_GT(skating["feet_of_b"]["slide_cm_s"].get<double>(), 2 * skating["feet_of_a"]["slide_cm_s"].get<double>());
+  for (const char* key : {"slide_cm_s", "lowest_speed_cm_s", "penetration_cm", "hover_cm"}) {
+    EXPECT_TRUE(snake["feet_of_a"][key].is_null()) << key;
+  }
 }
 
 TEST_F(FeetCommands, contacts_go_round_as_labels_of_a_library) {

@@ -50,6 +50,23 @@ TEST_F(SynthesisCommands, transition_writes_the_motion_its_picture_and_its_figur
   EXPECT_NE(read_text(out("t.svg")).find("</svg>"), std::string::npos);
 }
 
+TEST_F(SynthesisCommands, a_transition_tells_the_feet_by_geometry_and_plants_them_unless_told_not_to) {
+  const std::vector<std::string> call{"transition", library(),    "walk_normal_001", "run_normal_001",
+                                      "-o",         out("f.bvh"), "--json"};
+  const auto planned = run_command(call);
+  auto plain_call = call;
+  plain_call.push_back("--no-clean-feet");
+  const auto plain = run_command(plain_call);
+  ASSERT_EQ(planned.code + plain.code, 0) << planned.err << plain.err;
+  const json with = json::parse(planned.out)["seams"][0], without = json::parse(plain.out)["seams"][0];
+  EXPECT_TRUE(with["feet_planned"]);
+  EXPECT_FALSE(without["feet_planned"]);
+  EXPECT_LT(with["feet"]["slide_cm_s"], without["feet"]["slide_cm_s"]);
+  EXPECT_LT(with["feet"]["slide_cm_s"].get<double>(), 1.3 * with["feet_of_clips"]["slide_cm_s"].get<double>());
+  EXPECT_TRUE(with["way"] == "blend" || with["way"] == "inertialization");
+  EXPECT_GE(with["scale"].get<double>(), 0.8 - 1e-6);
+}
+
 TEST_F(SynthesisCommands, the_way_through_the_graph_is_kept_in_the_library) {
   const auto before = std::filesystem::file_size(library());
   const auto result = run_command(

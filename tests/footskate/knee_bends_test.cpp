@@ -1,11 +1,11 @@
 // Knees near full extension: smooth at any rate, and exact where the leg is bent.
+#include "kinespace/footskate/detail/knee_bends.h"
+
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include <gtest/gtest.h>
-
-#include "kinespace/footskate/detail/knee_bends.h"
 
 namespace kinespace {
 namespace {

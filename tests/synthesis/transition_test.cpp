@@ -97,7 +97,8 @@ TEST_F(Transitions, feet_slide_no_more_than_in_the_clips_and_less_than_without_a
     EXPECT_FALSE(plain->transition.joins[0].feet_planned);
     const Clip first = view_.clip(view_.require_clip(names[0]));
     const FootMotion feet = feet_in_overlap(plan->transition, first);
-    EXPECT_NEAR(feet.slide_cm_s.value_or(0), join.feet->slide_cm_s.value_or(0), 0.5) << "what it says is what comes out";
+    EXPECT_NEAR(feet.slide_cm_s.value_or(0), join.feet->slide_cm_s.value_or(0), 0.5)
+        << "what it says is what comes out";
     slide += feet.slide_cm_s.value_or(0);
     usual += join.feet_of_sources->slide_cm_s.value_or(0);
     unplanned += feet_in_overlap(plain->transition, first).slide_cm_s.value_or(0);
@@ -147,8 +148,9 @@ TEST_F(Transitions, inertialization_leaves_no_step_at_the_seam) {
   const Clip& made = plan->transition.clip;
   for (int f = 0; f < count; ++f) {
     for (int j = made.skeleton.travel_root() + 1; j < made.skeleton.joint_count(); ++j) {
-      EXPECT_LT(made.rotation(j, made.frames - count + f).angularDistance(second.rotation(j, second.frames - count + f)),
-                1e-6);
+      EXPECT_LT(
+          made.rotation(j, made.frames - count + f).angularDistance(second.rotation(j, second.frames - count + f)),
+          1e-6);
     }
   }
 }
