@@ -139,6 +139,31 @@ double spread(const std::vector<Rest>& rests) {
   return std::hypot(high.x() - low.x(), high.z() - low.z());
 }
 
+// Whether a plane through so few resting places says anything: one that rises goes through any three of them. Asked are
+// supports of both feet at three places or more along the rise, a step apart in place and one after another in time,
+// and a body above the plane.
+bool believable(const Ground& slope, const std::vector<Rest>& rests, const FootTracks& t, double band) {
+  const double leg = t.feet.leg_length_cm;
+  const double step = 0.4 * leg;
+  const Eigen::Vector2d along = slope.gradient.normalized();
+  std::vector<const Rest*> by_time;
+  for (const Rest& r : rests) {
+    if (std::abs(r.place.y() - slope.at(r.place)) <= band) by_time.push_back(&r);
+  }
+  std::ranges::sort(by_time, {}, [](const Rest* r) { return std::pair(r->first_frame, r->slot); });
+  std::vector<double> places;  // along the rise
+  std::array<bool, 2> feet{};
+  for (const Rest* r : by_time) {
+    const double at = along.dot(Eigen::Vector2d(r->place.x(), r->place.z()));
+    const bool apart = std::ranges::all_of(places, [&](double other) { return std::abs(at - other) >= step; });
+    if (apart) places.push_back(at);
+    feet[static_cast<std::size_t>(r->slot / 2)] = true;
+  }
+  if (places.size() < 3 || !feet[0] || !feet[1]) return false;
+  const auto held = std::ranges::count_if(t.root, [&](const Eigen::Vector3d& p) { return p.y() > slope.at(p) + 0.3 * leg; });
+  return static_cast<double>(held) >= 0.95 * t.frames;
+}
+
 Ground lowest_point(const FootTracks& t) {
   double low = std::numeric_limits<double>::infinity();
   for (const Path& path : t.at) {
@@ -253,7 +278,7 @@ Ground estimate_ground(const FootTracks& tracks) {
   if (spread(rests) > 0.5 * tracks.feet.leg_length_cm) {
     double share = 0;
     const Ground slope = fit_plane(rests, band, share);
-    if (share >= 0.9 && slope.gradient.norm() <= 0.7) return slope;
+    if (share >= 0.9 && slope.gradient.norm() <= 0.7 && believable(slope, rests, tracks, band)) return slope;
   }
   return {.kind = GroundKind::uneven, .height_cm = lowest_level(rests, band)};
 }

@@ -7,7 +7,8 @@
 //
 //   flat    at least 90 % of the rest lies within 3 % of the leg length of one height (85 % when the others are above
 //           it and never alone in bearing the body: a foot held in the air)
-//   slope   the same about a plane that rises by at most 0.7, over at least half a leg length
+//   slope   the same about a plane that rises by at most 0.7, over at least half a leg length, with both feet at three
+//           places or more along the rise and the body above it
 //   uneven  neither: stairs, steps, boxes, bars. Every plant then stands at its own height; the height stated is that
 //           of the lowest level with a tenth of the rest
 //
