@@ -218,6 +218,7 @@ class ViewBuilder {
  private:
   Json overview() {
     Json out{{"library", library_.library().path().filename().string()},
+             {"first", options_.clips.empty() ? Json() : Json(place_.at(library_.require_clip(options_.clips.front()).name))},
              {"spaces", Json::array()},
              {"skeletons", Json::array()}};
     LevelTable levels;

@@ -1,7 +1,7 @@
 // run.mjs BUILD ROOT: the tests of the page of `kinespace view`: its types, its reader of motion, its data, and the page in
 // a browser. What a machine lacks is skipped and said (scripts/test lists it; in CI it is a failure).
 import { spawnSync } from "node:child_process";
-import { cpSync, mkdirSync, readdirSync } from "node:fs";
+import { copyFileSync, mkdirSync, readdirSync, renameSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 
@@ -19,12 +19,19 @@ function run(command, args, options = {}) {
   return done.status ?? 1;
 }
 
+// A few of the sample clips, and their library.
 function prepare() {
   const quiet = { cwd: folder, stdio: ["ignore", "ignore", "inherit"] };
-  if (run(join(build, "kinespace-samples"), ["clips"], quiet)) throw new Error("no sample clips");
+  if (run(join(build, "kinespace-samples"), ["all"], quiet)) throw new Error("no sample clips");
+  mkdirSync(join(folder, "clips"));
+  for (const file of readdirSync(join(folder, "all"))) {
+    if (/^(walk_fast|walk_normal|run_fast|jump_forward|wave_left|turn_left)_00[12]\.bvh$/.test(file)) {
+      renameSync(join(folder, "all", file), join(folder, "clips", file));
+    }
+  }
   mkdirSync(join(folder, "few"));
-  for (const file of readdirSync(join(folder, "clips"))) {
-    if (/^(walk_fast|jump_forward|wave_left|turn_left).*_00[12]\.bvh$/.test(file)) cpSync(join(folder, "clips", file), join(folder, "few", file));
+  for (const name of ["walk_fast_001", "walk_fast_002", "jump_forward_001", "wave_left_001"]) {
+    copyFileSync(join(folder, "clips", `${name}.bvh`), join(folder, "few", `${name}.bvh`));
   }
   if (run(join(build, "kinespace"), ["build", "clips", "-o", "sample.kspace", "--quiet"], quiet)) throw new Error("no library");
 }

@@ -36,8 +36,11 @@ export function bodyOf(skeleton: SkeletonData): Body {
   const bones: Bone[] = [];
   const bone = (from: number, to: number, length: number, name: string) => {
     if (length < height * 0.004) return;
-    const radius = Math.min(Math.max(length * 0.17, height * 0.009), height * 0.03);
-    bones.push({ from, to, radius, side: sideOf(name) });
+    const side = sideOf(name);
+    const torso = side === "body" && !/neck|head/i.test(name);
+    const [share, most] = torso ? [0.55, 0.047] : [0.17, 0.03];
+    const radius = Math.min(Math.max(length * share, height * 0.009), height * most);
+    bones.push({ from, to, radius, side });
   };
   joints.forEach((joint, j) => {
     if (joint.parent >= 0 && !above.has(joint.parent)) bone(joint.parent, j, Math.hypot(...joint.offset), joint.name);

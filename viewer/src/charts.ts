@@ -76,8 +76,8 @@ export function errorChart(lines: Line[], levels: number, now: number): SVGEleme
     if (points.length === 0) continue;
     chart.append(svg("path", { d: path(points, px, py), fill: "none", stroke: line.colour, "stroke-width": line.thin ? 1.2 : 2, ...(line.thin ? { "stroke-dasharray": "3 3" } : {}) }));
     for (const [x, y] of points) if (!line.thin) chart.append(svg("circle", { cx: px(x), cy: py(y), r: 2.2, fill: line.colour }));
-    const [x, y] = points[0]!;
-    chart.append(svg("text", { x: px(x) + 5, y: py(y) - 5, style: `fill:${line.colour}` }, line.name));
+    const [x, y] = points.at(-1)!;
+    chart.append(svg("text", { x: px(x), y: py(y) - 5, "text-anchor": "end", style: `fill:${line.colour}` }, line.name));
   }
   chart.append(svg("line", { class: "now", x1: px(now), x2: px(now), y1: top, y2: height - bottom }));
   return chart;

@@ -62,6 +62,7 @@ export interface LevelData {
 
 export interface Overview {
   library: string;
+  first: number | null; // the clip that plays when the page opens; null: the first that is in it
   spaces: SpaceData[];
   skeletons: SkeletonData[];
   levels: LevelData[]; // over all clips, of the levels that were measured

@@ -28,7 +28,7 @@ class Page {
   private dirty = true;
 
   constructor() {
-    const first = this.library.playable()[0];
+    const first = this.library.overview.first ?? this.library.playable()[0];
     const played = first === undefined ? undefined : this.library.motion(first);
     if (!played) throw new Error("no clip of the library is in this page");
     this.played = played;
@@ -44,7 +44,10 @@ class Page {
       this.dirty = true;
     });
     new ResizeObserver(() => this.relayout()).observe(byId("scene"));
-    darkness.addEventListener("change", () => this.choose(this.played.index, false));
+    darkness.addEventListener("change", () => {
+      this.map.relabel();
+      this.choose(this.played.index, false);
+    });
     this.sayLibrary();
     this.listen();
     this.choose(this.played.index);
@@ -208,9 +211,9 @@ class Page {
         const cell = cells[i]!;
         const caption = element("div", "", "caption");
         Object.assign(caption.style, { left: `${cell.x}px`, top: `${cell.y}px`, width: `${cell.width}px`, height: `${cell.height}px` });
-        const distance = this.played.motion.data.nearest?.[i - 1];
-        const what = i === 0 ? "this clip" : `no. ${i}, distance ${distance?.[1].toFixed(4) ?? ""}`;
-        caption.append(element("strong", printable(clip.clip.name)), element("span", `${what}, ${clip.duration.toFixed(2)} s`));
+        const distance = this.played.motion.data.nearest?.find(([other]) => i > 0 && other === clip.index);
+        const what = distance === undefined ? "this clip" : `distance ${distance[1].toFixed(4)}`;
+        caption.append(element("strong", printable(clip.clip.name)), element("span", what));
         captions.append(caption);
       });
     }

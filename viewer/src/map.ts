@@ -35,7 +35,10 @@ export class MotionMap {
     this.search.addEventListener("input", () => this.listFound());
     this.search.addEventListener("keydown", (event) => {
       const first = this.matches().find((i) => library.plays(i));
-      if (event.key === "Enter" && first !== undefined) play(first);
+      if (event.key === "Enter" && first !== undefined) {
+        play(first);
+        byId("canvas").focus(); // keys are for the player again
+      }
       if (event.key === "Escape") this.find("");
     });
     this.canvas.addEventListener("pointermove", (event) => this.hover(this.dotAt(event)));
@@ -104,7 +107,8 @@ export class MotionMap {
     return this.colourBy.value === "" ? undefined : clip.labels[Number(this.colourBy.value)];
   }
 
-  private relabel(): void {
+  // Also when the page turned dark or light.
+  relabel(): void {
     const counts = new Map<string, number>();
     for (const i of this.shown) {
       const label = this.labelOf(this.clips[i]!);

@@ -77,7 +77,7 @@ export class FunctionPanel {
     const own = clip.motion.data.levels;
     const all = this.library.overview.levels;
     const lines: Line[] = [
-      { name: "worst", colour: theme.text("right"), points: own.map(([l, , max]) => [l, max]) },
+      { name: "worst joint", colour: theme.text("right"), points: own.map(([l, , max]) => [l, max]) },
       { name: "mean", colour: theme.text("left"), points: own.map(([l, mean]) => [l, mean]) },
       { name: "", thin: true, colour: theme.text("right"), points: all.map((l) => [l.functions, l.max_joint_error_cm]) },
       { name: "", thin: true, colour: theme.text("left"), points: all.map((l) => [l.functions, l.mean_joint_error_cm]) },

@@ -94,11 +94,13 @@ void main() {
   }
   vec3 n = normalize(normal);
   vec3 v = normalize(eye - world);
-  vec3 key = normalize(vec3(0.45, 0.85, 0.35));
-  float light = 0.50 + 0.16 * n.y + 0.42 * max(dot(n, key), 0.0);
+  // The light stands to the right of whoever looks, and above.
+  vec3 front = normalize(vec3(v.x, 0.0, v.z) + vec3(1e-4));
+  vec3 key = normalize(vec3(0.0, 0.8, 0.0) + 0.6 * front + 0.4 * vec3(front.z, 0.0, -front.x));
+  float light = 0.66 + 0.1 * n.y + 0.42 * max(dot(n, key), 0.0);
   float rim = pow(1.0 - max(dot(n, v), 0.0), 3.0);
   float gloss = pow(max(dot(n, normalize(key + v)), 0.0), 42.0);
-  vec3 lit = colour.rgb * light + vec3(0.10) * rim + vec3(0.16) * gloss;
+  vec3 lit = colour.rgb * light + vec3(0.06) * rim + vec3(0.16) * gloss;
   pixel = vec4(lit * colour.a, colour.a);
 }`;
 

@@ -25,8 +25,11 @@ export interface Cell {
 // As many cells as there are clips, about as wide as high.
 export function cellsOf(count: number, width: number, height: number): Cell[] {
   let columns = 1;
-  const squareness = (n: number) => Math.abs(Math.log(width / n / (height / Math.ceil(count / n)) / 0.85));
-  for (let n = 2; n <= count; ++n) if (squareness(n) < squareness(columns)) columns = n;
+  const badness = (n: number) => {
+    const rows = Math.ceil(count / n);
+    return Math.abs(Math.log(width / n / (height / rows) / 0.85)) + 0.25 * (n * rows - count);
+  };
+  for (let n = 2; n <= count; ++n) if (badness(n) < badness(columns)) columns = n;
   const rows = Math.ceil(count / columns);
   return Array.from({ length: count }, (_, i) => ({
     x: ((i % columns) * width) / columns,
@@ -115,7 +118,7 @@ export class Stage {
     addBody(clip.body, positions, clip.points, frame, colours, view.solid);
     if (scene.trails) this.addTrails(clip, positions, frame, view);
     if (scene.ghost) {
-      const ghost = this.theme.colour("ghost", 0.4);
+      const ghost = this.theme.colour("ghost", 0.5);
       const of = clip.original ?? clip.positions(-1);
       const points = clip.original ? clip.body.joints : clip.points;
       addBody(clip.body, of, points, frame, { body: ghost, left: ghost, right: ghost }, view.ghost, 0.92);
