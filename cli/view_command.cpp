@@ -42,8 +42,9 @@ std::filesystem::path output_of(const ViewCommandOptions& options) {
 void note_what_is_left_out(const ViewData& data, const ViewCommandOptions& options, Session& session) {
   const std::size_t shown = data.motions.size();
   if (options.view.clips.empty() && shown < data.clips) {
-    session.note(fmt::format("{} of {} clips play in the page; all are on its map. --max-size takes in more, or name clips",
-                             shown, data.clips));
+    session.note(
+        fmt::format("{} of {} clips play in the page; all are on its map. --max-size takes in more, or name clips",
+                    shown, data.clips));
   }
   if (options.view.nearest > 0 && data.with_nearest < shown) {
     session.note(fmt::format("the nearest motions are known of {} clips: more are not looked for", data.with_nearest));

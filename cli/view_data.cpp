@@ -146,8 +146,8 @@ Json side_tracks_json(const std::vector<SideTrack>& tracks) {
     out.push_back({{"joint", track.joint},
                    {"dimensions", track.dimensions},
                    {"frames", track.frames},
-                   {"values", floats(Eigen::Map<const Eigen::VectorXd>(track.values.data(),
-                                                                       static_cast<Eigen::Index>(track.values.size())))}});
+                   {"values", floats(Eigen::Map<const Eigen::VectorXd>(
+                                  track.values.data(), static_cast<Eigen::Index>(track.values.size())))}});
   }
   return out;
 }
@@ -218,7 +218,8 @@ class ViewBuilder {
  private:
   Json overview() {
     Json out{{"library", library_.library().path().filename().string()},
-             {"first", options_.clips.empty() ? Json() : Json(place_.at(library_.require_clip(options_.clips.front()).name))},
+             {"first",
+              options_.clips.empty() ? Json() : Json(place_.at(library_.require_clip(options_.clips.front()).name))},
              {"spaces", Json::array()},
              {"skeletons", Json::array()}};
     LevelTable levels;
@@ -373,8 +374,7 @@ std::size_t ViewData::bytes() const {
   return sum;
 }
 
-ViewData view_data(LibraryView& library, const ViewOptions& options, const Compute& compute,
-                   const Progress& progress) {
+ViewData view_data(LibraryView& library, const ViewOptions& options, const Compute& compute, const Progress& progress) {
   return ViewBuilder(library, options, compute, progress).build();
 }
 

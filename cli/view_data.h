@@ -17,10 +17,10 @@
 namespace kinespace::cli {
 
 struct ViewOptions {
-  std::vector<std::string> clips;      // these, and the nearest of each; none: all
+  std::vector<std::string> clips;       // these, and the nearest of each; none: all
   std::size_t most_bytes = 30'000'000;  // of the data in the page
-  int nearest = 5;                     // how many of the nearest clips of each are found; 0: none
-  bool originals = false;              // also where joints were in the files that clips came from
+  int nearest = 5;                      // how many of the nearest clips of each are found; 0: none
+  bool originals = false;               // also where joints were in the files that clips came from
 };
 
 // Of so many clips at most the nearest ones are found: each takes a query with DTW.

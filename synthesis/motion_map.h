@@ -20,7 +20,7 @@ struct MapPoint {
 };
 
 struct MotionMap {
-  std::vector<MapPoint> points;   // in the order of the matrix
+  std::vector<MapPoint> points;    // in the order of the matrix
   std::array<double, 2> shares{};  // of the variance of the vectors, along each axis; 0 where there is none
 };
 

