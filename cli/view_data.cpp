@@ -204,6 +204,11 @@ class ViewBuilder {
   }
 
   ViewData build() {
+    if (rows_.empty()) {
+      throw Error(ErrorKind::bad_input, {.file = library_.library().path().string(),
+                                         .found = "a library without clips",
+                                         .expected = "one with something to show"});
+    }
     out_.overview = text_of(overview());
     require_room();
     if (options_.clips.empty()) {
@@ -336,10 +341,15 @@ class ViewBuilder {
     constexpr int most_refused = 20;  // clips that are too long are passed over, but not a whole library
     int refused = 0;
     std::size_t done = 0;
+    std::size_t least_lacking = 0;
     for (const std::size_t at : evenly_spread(rows_.size())) {
       progress_.at("clips", static_cast<double>(done++) / static_cast<double>(rows_.size()));
-      if (take(at) > 0 && ++refused >= most_refused) break;
+      const std::size_t lacking = take(at);
+      if (lacking == 0) continue;
+      least_lacking = refused == 0 ? lacking : std::min(least_lacking, lacking);
+      if (++refused >= most_refused) break;
     }
+    if (out_.motions.empty()) refuse_size("the map with a single clip", options_.most_bytes + least_lacking);
   }
 
   void take_named() {

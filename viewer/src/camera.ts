@@ -4,17 +4,19 @@ import { lookAt, multiply, normalised, perspective, type Matrix, type Vector } f
 const fieldOfView = (38 * Math.PI) / 180;
 
 export class OrbitCamera {
-  azimuth = 0.65;
+  heading = 0; // of what is looked at
+  azimuth = 0.65; // from there
   elevation = 0.2;
   distance = 420;
   target: Vector = [0, 90, 0];
 
   eye(): Vector {
     const flat = Math.cos(this.elevation) * this.distance;
+    const turn = this.heading + this.azimuth;
     return [
-      this.target[0] + flat * Math.sin(this.azimuth),
+      this.target[0] + flat * Math.sin(turn),
       this.target[1] + Math.sin(this.elevation) * this.distance,
-      this.target[2] + flat * Math.cos(this.azimuth),
+      this.target[2] + flat * Math.cos(turn),
     ];
   }
 
@@ -33,7 +35,7 @@ export class OrbitCamera {
 
   pan(dx: number, dy: number): void {
     const scale = this.distance / 700;
-    const right = normalised([Math.cos(this.azimuth), 0, -Math.sin(this.azimuth)]);
+    const right = normalised([Math.cos(this.heading + this.azimuth), 0, -Math.sin(this.heading + this.azimuth)]);
     for (let k = 0; k < 3; ++k) this.target[k]! -= right[k]! * dx * scale;
     this.target[1] += dy * scale;
   }

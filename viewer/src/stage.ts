@@ -41,7 +41,8 @@ export function cellsOf(count: number, width: number, height: number): Cell[] {
 
 export class Stage {
   readonly camera = new OrbitCamera();
-  private pan: Vector = [0, 0, 0];
+  private pan: Vector = [0, 0, 0]; // by hand, beside what the camera goes with
+  private aimed: Vector = [0, 0, 0]; // where the last picture looked
   private views: View[] = [];
 
   constructor(
@@ -63,7 +64,6 @@ export class Stage {
     for (let k = 0; k < 3; ++k) this.pan[k]! += this.camera.target[k]! - this.aimed[k]!;
     this.aimed = [...this.camera.target];
   }
-  private aimed: Vector = [0, 0, 0];
 
   draw(scene: Scene): void {
     const cells = cellsOf(scene.clips.length, this.canvas.clientWidth, this.canvas.clientHeight);
@@ -83,8 +83,7 @@ export class Stage {
     const aim = scene.follow || at > 0 ? clip.target(frame) : clip.extent().centre;
     const place: Vector = [aim[0] + this.pan[0], aim[1] + this.pan[1], aim[2] + this.pan[2]];
     // Clips are seen from the same side of where they looked at first.
-    const azimuth = camera.azimuth;
-    camera.azimuth += clip.motion.data.heading;
+    camera.heading = clip.motion.data.heading;
     camera.target = place;
     const view: View = (this.views[at] ??= {
       ...cell,
@@ -104,7 +103,6 @@ export class Stage {
       centre: aim,
       reach: Math.max(700, camera.distance * 1.9),
     });
-    camera.azimuth = azimuth;
     this.aimed = [...place];
     this.fillBodies(scene, clip, frame, view);
   }
