@@ -54,10 +54,10 @@ test("a page keeps to --max-size, takes clips from all of the list, and says wha
   const { code, said } = refused("view", library, "-o", page, "--max-size", "0.01");
   assert.equal(code, 2);
   assert.match(said, /--max-size/);
-  const none = refused("view", library, "-o", page, "--nearest", "0", "--max-size", ((overviewSize + 2000) / 1e6).toFixed(4));
+  const none = refused("view", library, "-o", page, "--nearest", "0", "--max-size", ((overviewSize + 500) / 1e6).toFixed(4));
   assert.equal(none.code, 2);
   assert.match(none.said, /a single clip/);
-  const clip = refused("view", library, "walk_fast_001", "-o", page, "--nearest", "0", "--max-size", ((overviewSize + 2000) / 1e6).toFixed(4));
+  const clip = refused("view", library, "walk_fast_001", "-o", page, "--nearest", "0", "--max-size", ((overviewSize + 500) / 1e6).toFixed(4));
   assert.equal(clip.code, 2);
   assert.match(clip.said, /walk_fast_001/);
 });
