@@ -273,7 +273,7 @@ class ViewBuilder {
   [[noreturn]] void refuse_size(const std::string& what, std::size_t needed) const {
     throw Error(ErrorKind::usage,
                 {.file = library_.library().path().string(),
-                 .found = fmt::format("{}, {:.1f} MB in all", what, static_cast<double>(needed) / 1e6),
+                 .found = fmt::format("{}, {:.4g} MB in all", what, static_cast<double>(needed) / 1e6),
                  .expected = fmt::format("a page of at most {:.6g} MB", static_cast<double>(options_.most_bytes) / 1e6),
                  .remedy = "give more with --max-size"});
   }
