@@ -43,7 +43,7 @@ after(async () => {
 async function open(file = page_, size) {
   const page = await context.newPage();
   if (size) await page.setViewportSize(size);
-  page.setDefaultTimeout(10_000);
+  page.setDefaultTimeout(120_000); // no claim: a machine may be busy
   page.on("console", (message) => complaints.push(`${message.type()}: ${message.text()}`));
   page.on("pageerror", (error) => complaints.push(String(error)));
   page.on("dialog", async (dialog) => {
