@@ -42,6 +42,9 @@ after(async () => {
 
 async function open(file = page_, size) {
   const page = await context.newPage();
+  // One that a failed test left would go on drawing.
+  for (const other of context.pages()) if (other !== page) await other.close();
+  complaints.length = requests.length = 0;
   if (size) await page.setViewportSize(size);
   page.setDefaultTimeout(120_000); // no claim: a machine may be busy
   page.on("console", (message) => complaints.push(`${message.type()}: ${message.text()}`));
