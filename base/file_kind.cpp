@@ -23,6 +23,7 @@ constexpr std::array beginnings = {
     Beginning{"ply\r"sv, FileKind::ply},
     Beginning{"<svg"sv, FileKind::svg},
     Beginning{"<?xml"sv, FileKind::svg},
+    Beginning{"<!doctype html>"sv, FileKind::html},
 };
 
 // The words with which the first line of a text that is no comment begins.
@@ -98,6 +99,8 @@ std::string_view describe(FileKind kind) {
       return "an SVG picture";
     case FileKind::png:
       return "a PNG picture";
+    case FileKind::html:
+      return "a page (HTML)";
     case FileKind::numpy:
       return "a NumPy array";
     case FileKind::obj:

@@ -19,6 +19,7 @@ enum class FileKind : std::uint8_t {
   json,  // glTF text among it
   svg,
   png,
+  html,
   numpy,
   obj,
   ply,

@@ -11,6 +11,7 @@
 
 #include "cli/commands.h"
 #include "cli/json_output.h"
+#include "cli/level_table.h"
 #include "cli/output.h"
 #include "cli/repeat_report.h"
 #include "cli/stream_file.h"
@@ -108,42 +109,6 @@ Json share_of(const std::optional<double>& part, double whole) {
 double cycles_of(const Library& library) {
   return static_cast<double>(library.metadata_count("cycles").value_or(0));
 }
-
-// Of all clips whose errors are known: frames count alike.
-class LevelTable {
- public:
-  void add(const ClipRow& clip, const std::vector<LevelError>& errors) {
-    for (const LevelError& l : errors) {
-      Sum& sum = levels_[l.level];
-      const auto frames = static_cast<double>(clip.frames);
-      sum.frames += frames;
-      sum.error += l.error.mean_joint_error_cm * frames;
-      if (l.error.max_joint_error_cm > sum.largest) {
-        sum.largest = l.error.max_joint_error_cm;
-        sum.clip = clip.name;
-      }
-    }
-  }
-  [[nodiscard]] Json rows() const {
-    Json out = Json::array();
-    for (const auto& [level, sum] : levels_) {
-      out.push_back({{"functions", level},
-                     {"mean_joint_error_cm", sum.error / sum.frames},
-                     {"max_joint_error_cm", sum.largest},
-                     {"worst_clip", sum.clip}});
-    }
-    return out;
-  }
-
- private:
-  struct Sum {
-    double frames = 0;
-    double error = 0;
-    double largest = 0;
-    std::string clip;
-  };
-  std::map<int, Sum> levels_;
-};
 
 int whole_cycles(const EncodedClip& clip) {
   int cycles = 0;

@@ -281,6 +281,7 @@ TEST(FileKind, is_told_by_how_a_file_begins) {
   EXPECT_EQ(kind(":FULLY-SPECIFIED\n"), FileKind::amc);
   EXPECT_EQ(kind("# frame\nv 1 2 3"), FileKind::obj);
   EXPECT_EQ(kind("{\"asset\": 1}"), FileKind::json);
+  EXPECT_EQ(kind("<!doctype html>\n<html>"), FileKind::html);
   EXPECT_EQ(kind("#"), FileKind::other);
   EXPECT_EQ(kind("vertical lines"), FileKind::other);
 }

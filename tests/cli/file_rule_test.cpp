@@ -46,6 +46,7 @@ const std::map<std::string, std::vector<std::string>>& calls() {
        {"@walk.bvh", "--library", "@lib.kspace", "--from", "0.5", "--to", "0.6", ">--output", "-o", ">--picture",
         "--picture"}},
       {"info", {"@walk.bvh", "--repeats", ">--picture", "--picture"}},
+      {"view", {"@lib.kspace", ">--output", "-o"}},
       {"mesh encode", {"@mesh", ">--output", "-o"}},
       {"mesh decode", {"@mesh.ksm", ">--output", "-o"}},
       {"mesh compare", {"@mesh", "@mesh.ksm", ">--picture", "--picture"}},
