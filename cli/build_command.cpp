@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/bad_files.h"
 #include "cli/commands.h"
 #include "cli/device_choice.h"
 #include "cli/json_output.h"
@@ -25,6 +26,7 @@ struct BuildOptions {
   int functions = 0;
   std::string device = "auto";
   bool no_align = false;
+  bool skip_bad = false;
   bool json = false;
 };
 
@@ -32,6 +34,7 @@ Json to_json(const LibraryReport& report, const std::filesystem::path& output, d
   return {{"library", output.string()},
           {"clips", report.clips},
           {"added", report.added},
+          {"bad_files", to_json(BadFiles(report.bad))},
           {"unchanged", report.unchanged},
           {"resumed", report.resumed},
           {"sequences", report.sequences},
@@ -74,6 +77,7 @@ void run_build(BuildOptions options, Session& session) {
   library.space.space.grouping = grouping_of(options.grouping);
   if (options.functions > 0) library.space.space.functions = options.functions;
   if (!options.asf.empty()) library.asf = options.asf;
+  library.leave_out_bad = true;
   const auto files = find_motion_files(options.inputs);
   session.detail(fmt::format("{} motion files", files.size()));
   const Compute compute = open_device(options.device, session, files.size());
@@ -81,12 +85,14 @@ void run_build(BuildOptions options, Session& session) {
   session.when_stopped = [output = options.output] { return what_a_stopped_build_leaves(output); };
   const LibraryReport report = build_library(files, options.output, library, compute, stages.watch(session.progress()));
   session.finish_progress();
+  for (const std::string& note : report.notes) session.note(note);
   for (const std::string& doubt : report.doubts) session.note(doubt);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   Json result = to_json(report, options.output, elapsed.count());
   if (!options.json) print_fields(result);
   stages.finish(result, session);
   if (options.json) print_json(result);
+  BadFiles(report.bad).tell(options.skip_bad, session);
 }
 
 }  // namespace
@@ -122,6 +128,7 @@ void add_build(CLI::App& app, Session& session) {
       ->capture_default_str();
   command->add_flag("--no-align", options->no_align,
                     "As many sequences, but of equal length at any phase, and no warps: what registration is worth");
+  add_skip_bad(command, options->skip_bad);
   add_device_option(command, options->device);
   command->add_flag("--json", options->json, "Print the result as one JSON object");
   session.files.reads(command, {"CLIPS", "--asf"});

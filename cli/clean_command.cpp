@@ -3,6 +3,7 @@
 #include <optional>
 #include <utility>
 
+#include "cli/clip_input.h"
 #include "cli/commands.h"
 #include "cli/foot_figures.h"
 #include "cli/json_output.h"
@@ -18,6 +19,7 @@ namespace {
 
 struct CleanCommandOptions {
   std::filesystem::path input;
+  ClipChoice choice;
   std::filesystem::path output;
   std::string feet;
   std::optional<double> floor_cm;
@@ -68,7 +70,7 @@ void run_clean(const CleanCommandOptions& options, Session& session) {
     if (!model) session.note("the library has no contact labels: the standard model decides");
   }
   if (model) clean_options.model = &*model;
-  Clip clip = read_clip(options.input);
+  Clip clip = read_input(options.input, options.choice, session);
   session.note_doubts(clip);
   Session::check_stop();
   std::optional<Clip> before;
@@ -90,6 +92,7 @@ void add_clean(CLI::App& app, Session& session) {
   command->add_option("IN", options->input, "The clip: " + listed(clip_endings_read()))->required();
   command->add_option("-o,--output", options->output, "The file to write: " + listed(clip_endings_written()))
       ->required();
+  add_clip_choice(command, options->choice);
   command->add_option("--feet", options->feet, "The ankle joints as LEFT,RIGHT; found by name and shape otherwise");
   command->add_option("--floor", options->floor_cm, "The floor is flat at this height in cm; estimated otherwise");
   command->add_option("--library", options->library, "Use the contact labels of this library (kinespace contacts)");

@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "cli/clip_input.h"
 #include "cli/commands.h"
 #include "cli/foot_figures.h"
 #include "cli/json_output.h"
@@ -15,6 +16,7 @@ namespace {
 struct CompareOptions {
   std::filesystem::path reference;
   std::filesystem::path other;
+  ClipChoice choice, other_choice;
   bool json = false;
 };
 
@@ -45,9 +47,9 @@ void add_skate(Json& result, const Clip& reference, const Clip& other, Session& 
 }
 
 void run_compare(const CompareOptions& options, Session& session) {
-  const Clip reference = read_clip(options.reference);
+  const Clip reference = read_input(options.reference, options.choice, session);
   Session::check_stop();
-  const Clip other = read_clip(options.other);
+  const Clip other = read_input(options.other, options.other_choice, session);
   Session::check_stop();
   Json result = to_json(compare(reference, other));
   add_skate(result, reference, other, session);
@@ -61,6 +63,8 @@ void add_compare(CLI::App& app, Session& session) {
   const auto options = std::make_shared<CompareOptions>();
   command->add_option("A", options->reference, "The reference: " + listed(clip_endings_read()))->required();
   command->add_option("B", options->other, "The clip to judge; joints are matched by name")->required();
+  add_clip_choice(command, options->choice);
+  command->add_option("--animation-b", options->other_choice.animation, "The same of clip B; --animation is of A");
   command->add_flag("--json", options->json, "Print the measures as one JSON object");
   session.files.reads(command, {"A", "B"});
   command->callback([options, &session] { run_compare(*options, session); });

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/clip_input.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
@@ -23,6 +24,7 @@ namespace {
 
 struct ContactsOptions {
   std::string clip;
+  ClipChoice choice;  // where the clip is a file
   std::optional<std::filesystem::path> library;
   bool next = false;
   std::string label;
@@ -50,18 +52,18 @@ const ContactModel& or_standard(const std::optional<ContactModel>& model) {
   return model ? *model : ContactModel::standard();
 }
 
-Clip clip_named(const ContactsOptions& options) {
-  if (!options.library) return read_clip(options.clip);
+Clip clip_named(const ContactsOptions& options, Session& session) {
+  if (!options.library) return read_input(options.clip, options.choice, session);
   LibraryView library(*options.library);
   const bool there = std::filesystem::exists(options.clip);
   if (there && (is_motion_file(options.clip) || !library.library().find_clip(options.clip))) {
-    return read_clip(options.clip);
+    return read_input(options.clip, options.choice, session);
   }
   return library.clip(library.require_clip(options.clip));
 }
 
-void run_detect(const ContactsOptions& options) {
-  const Clip clip = clip_named(options);
+void run_detect(const ContactsOptions& options, Session& session) {
+  const Clip clip = clip_named(options, session);
   const Feet feet = require_feet(clip, feet_names(options));
   std::optional<ContactModel> model;
   if (options.library) model = library_contact_model(Library::open_read_only(*options.library));
@@ -153,7 +155,7 @@ void run_label(const ContactsOptions& options) {
   options.json ? print_json(out) : print_fields(out);
 }
 
-void run_contacts(const ContactsOptions& options) {
+void run_contacts(const ContactsOptions& options, Session& session) {
   const int wishes = (options.next ? 1 : 0) + (options.label.empty() ? 0 : 1) + (options.clip.empty() ? 0 : 1);
   if (wishes != 1) {
     throw Error(ErrorKind::usage, {.found = "none or several of CLIP, --next and --label",
@@ -161,7 +163,7 @@ void run_contacts(const ContactsOptions& options) {
                                    .remedy = "kinespace contacts --help"});
   }
   if (options.next) return run_next(options);
-  options.label.empty() ? run_detect(options) : run_label(options);
+  options.label.empty() ? run_detect(options, session) : run_label(options);
 }
 
 }  // namespace
@@ -177,11 +179,12 @@ void add_contacts(CLI::App& app, Session& session) {
   CLI::Option* label = command->add_option("--label", options->label, "Keep labels for this clip of the library");
   label->needs(library);
   command->add_option("--from", options->from, "The labels: lines JOINT FIRST LAST; - is standard input")->needs(label);
+  add_clip_choice(command, options->choice);
   command->add_option("--feet", options->feet, "The ankle joints as LEFT,RIGHT; found by name and shape otherwise");
   command->add_flag("--json", options->json, "Print one JSON object");
   session.files.reads(command, {"CLIP", "--from"});
   session.files.updates(command, {"--library"});
-  command->callback([options] { run_contacts(*options); });
+  command->callback([options, &session] { run_contacts(*options, session); });
 }
 
 }  // namespace kinespace::cli

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/clip_input.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "kinespace/base/file.h"
@@ -16,13 +17,13 @@ namespace {
 struct ConvertOptions {
   std::filesystem::path input;
   std::filesystem::path output;
-  std::optional<std::filesystem::path> asf;
+  ClipChoice choice;
   bool json = false;
 };
 
 void convert(const ConvertOptions& options, Session& session) {
   static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
-  const Clip clip = read_clip(options.input, options.asf);
+  const Clip clip = read_input(options.input, options.choice, session);
   session.note_doubts(clip);
   Session::check_stop();
   write_clip(options.output, clip);
@@ -40,7 +41,7 @@ void convert(const ConvertOptions& options, Session& session) {
 }  // namespace
 
 void add_convert(CLI::App& app, Session& session) {
-  CLI::App* command = app.add_subcommand("convert", "Convert a clip between BVH, ASF/AMC and glTF (glTF: write only)");
+  CLI::App* command = app.add_subcommand("convert", "Convert a clip between BVH, ASF/AMC and glTF");
   const auto options = std::make_shared<ConvertOptions>();
   command
       ->add_option("IN", options->input,
@@ -50,7 +51,8 @@ void add_convert(CLI::App& app, Session& session) {
       ->add_option("OUT", options->output,
                    fmt::format("Where to: {}; an .amc writes the .asf too", listed(clip_endings_written())))
       ->required();
-  command->add_option("--asf", options->asf, "The skeleton of an .amc input");
+  command->add_option("--asf", options->choice.asf, "The skeleton of an .amc input");
+  add_clip_choice(command, options->choice);
   command->add_flag("--json", options->json, "Print what was written as JSON");
   session.files.reads(command, {"IN", "--asf"});
   session.files.writes(command, {"OUT"});

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/bad_files.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/output.h"
@@ -36,6 +37,7 @@ struct EncodeOptions {
   std::vector<std::string> settings;  // NAME=VALUE
   std::string profile;                // of codec rma: paper or default
   std::optional<double> variance;     // of codecs rma and clip-pca, percent
+  bool skip_bad = false;
   bool json = false;
 };
 
@@ -62,19 +64,26 @@ std::vector<fs::path> input_files(const std::vector<fs::path>& inputs) {
   return out;
 }
 
-std::vector<Clip> read_clips(const std::vector<fs::path>& files, const Progress& progress) {
+std::vector<Clip> read_all(const std::vector<fs::path>& files, BadFiles& bad, Session& session,
+                           const Progress& progress) {
   std::vector<Clip> out;
   const std::vector<std::string> by_folder = clip_names(files);
   std::map<std::string, int> names;
   for (std::size_t i = 0; i < files.size(); ++i) {
     progress.at("reading", static_cast<double>(i) / static_cast<double>(files.size()));
     Session::check_stop();
-    out.push_back(read_clip(files[i]));
-    out.back().name = by_folder[i];
-    // Two clips of one name could not be told apart when decoding: the same file, named twice.
-    const int seen = ++names[out.back().name];
-    if (seen > 1) out.back().name += fmt::format(" ({})", seen);
+    const auto note = [&](const std::string& what) { session.note(what); };
+    std::vector<Clip> clips;
+    bad.guard(files[i], [&] { clips = kinespace::read_clips(files[i], {.note = note}); });
+    for (Clip& clip : clips) {
+      clip.name = by_folder[i] + clip.name.substr(std::min(clip.name.size(), files[i].stem().string().size()));
+      // Two clips of one name could not be told apart when decoding: the same file, named twice.
+      const int seen = ++names[clip.name];
+      if (seen > 1) clip.name += fmt::format(" ({})", seen);
+      out.push_back(std::move(clip));
+    }
   }
+  if (out.empty()) require_no_bad_files(bad.files());
   return out;
 }
 
@@ -101,7 +110,8 @@ std::map<std::string, double, std::less<>> all_settings(const EncodeOptions& opt
 void run_encode(const EncodeOptions& options, Session& session) {
   StageLog stages{Compute()};  // no codec has kernels
   const Progress progress = stages.watch(session.progress());
-  const std::vector<Clip> clips = read_clips(input_files(options.inputs), progress);
+  BadFiles bad;
+  const std::vector<Clip> clips = read_all(input_files(options.inputs), bad, session, progress);
   std::optional<PoseSpaceBasis> basis;
   if (options.basis) {
     stages.begin("basis");
@@ -130,6 +140,7 @@ void run_encode(const EncodeOptions& options, Session& session) {
   Json result{{"codec", options.codec},
               {"output", options.output.string()},
               {"clips", clips.size()},
+              {"bad_files", to_json(bad)},
               {"frames", static_cast<std::int64_t>(frames)},
               {"bytes", stream.size()},
               {"bytes_per_frame", bytes / frames},
@@ -141,6 +152,7 @@ void run_encode(const EncodeOptions& options, Session& session) {
   if (!options.json) print_fields(result);
   stages.finish(result, session);
   if (options.json) print_json(result);
+  bad.tell(options.skip_bad, session);
 }
 
 void print_settings() {
@@ -191,6 +203,7 @@ void add_encode(CLI::App& app, Session& session) {
           },
           "List what the codecs can be set by: meaning (value when not set; range)")
       ->trigger_on_parse();
+  add_skip_bad(command, options->skip_bad);
   command->add_flag("--json", options->json, "Print what was written as one JSON object");
   session.files.reads(command, {"IN", "--basis"});
   session.files.writes(command, {"--output"}, FileKind::stream);

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/clip_input.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/option_checks.h"
@@ -27,6 +28,7 @@ struct ExportOptions {
   std::filesystem::path library;
   std::string clip;
   std::optional<std::filesystem::path> file;  // instead of a clip of the library
+  ClipChoice choice;
   std::filesystem::path output;
   std::optional<int> functions;
   std::optional<double> max_error_cm;
@@ -57,8 +59,9 @@ Exported clip_of_library(const ExportOptions& options, LibraryView& library) {
           .row = row};
 }
 
-Exported clip_of_file(const std::filesystem::path& file, LibraryView& library, Session& session) {
-  Clip clip = read_clip(file);
+Exported clip_of_file(const std::filesystem::path& file, const ClipChoice& choice, LibraryView& library,
+                      Session& session) {
+  Clip clip = read_input(file, choice, session);
   session.note_doubts(clip);
   const RegisteredSpace& space = library.require_space_for(clip, file);
   EncodedClip encoded = library.encode(clip, file);
@@ -198,7 +201,8 @@ void run_export(const ExportOptions& options, Session& session) {
   require_one_clip(options);
   static_cast<void>(files_written(options.output));  // an ending that cannot be written is told before the work
   LibraryView library(options.library);
-  Exported exported = options.file ? clip_of_file(*options.file, library, session) : clip_of_library(options, library);
+  Exported exported =
+      options.file ? clip_of_file(*options.file, options.choice, library, session) : clip_of_library(options, library);
   choose_level(options, library, session, exported);
   const bool planted = plants(options, exported, session);
   const ClipCurves played = decode(exported.space, exported.clip, exported.functions);
@@ -228,6 +232,7 @@ void add_export(CLI::App& app, Session& session) {
   command->add_option(
       "--clip", options->file,
       "A clip that is not in the library, played by the library's functions: " + listed(clip_endings_read()));
+  add_clip_choice(command, options->choice);
   command->add_option("-o,--output", options->output, "The file to write: " + listed(clip_endings_written()))
       ->required();
   CLI::Option* lod =

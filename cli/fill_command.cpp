@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/clip_input.h"
 #include "cli/commands.h"
 #include "cli/foot_figures.h"
 #include "cli/json_output.h"
@@ -22,6 +23,7 @@ namespace {
 
 struct FillCommandOptions {
   std::filesystem::path input;
+  ClipChoice choice;
   std::filesystem::path output;
   std::filesystem::path library;
   std::optional<double> from_s;
@@ -53,10 +55,27 @@ std::string times(const Clip& clip, const FrameRange& gap) {
   return fmt::format("{:.3f} to {:.3f} s", gap.first_frame / clip.rate_hz, gap.last_frame / clip.rate_hz);
 }
 
-// What looks missing. A clip that is held at its start or end is common and no gap: there is nothing on its other side.
-std::vector<FrameRange> found_gaps(const Clip& clip, const FillCommandOptions& options, Session& session) {
+// What looks missing in the clip with what its file says is lost, one after the other, none touching the next.
+std::vector<FrameRange> candidates(const Clip& clip, const std::vector<LostFrames>& lost) {
+  std::vector<FrameRange> all = missing_frames(clip);
+  for (const LostFrames& gap : lost) all.push_back({gap.first, gap.last});
+  std::ranges::sort(all, {}, &FrameRange::first_frame);
   std::vector<FrameRange> out;
-  for (const FrameRange& gap : missing_frames(clip)) {
+  for (const FrameRange& gap : all) {
+    if (!out.empty() && gap.first_frame <= out.back().last_frame + 1) {
+      out.back().last_frame = std::max(out.back().last_frame, gap.last_frame);
+    } else {
+      out.push_back(gap);
+    }
+  }
+  return out;
+}
+
+// What looks missing. A clip that is held at its start or end is common and no gap: there is nothing on its other side.
+std::vector<FrameRange> found_gaps(const Clip& clip, const std::vector<LostFrames>& lost,
+                                   const FillCommandOptions& options, Session& session) {
+  std::vector<FrameRange> out;
+  for (const FrameRange& gap : candidates(clip, lost)) {
     if (gap.first_frame < 2 || gap.last_frame > clip.frames - 3) {
       session.note(fmt::format("left as it is, seen from one side only: {}", times(clip, gap)));
     } else {
@@ -65,10 +84,11 @@ std::vector<FrameRange> found_gaps(const Clip& clip, const FillCommandOptions& o
     }
   }
   if (out.empty()) {
-    throw Error(ErrorKind::bad_input, {.file = options.input.string(),
-                                       .found = "no missing frames",
-                                       .expected = "three or more frames that repeat the one before them or are zero",
-                                       .remedy = "say which frames are missing with --from and --to"});
+    throw Error(ErrorKind::bad_input,
+                {.file = options.input.string(),
+                 .found = "no missing frames",
+                 .expected = "three or more frames that repeat the one before them or are zero, or nan",
+                 .remedy = "say which frames are missing with --from and --to"});
   }
   return out;
 }
@@ -122,10 +142,11 @@ void run_fill(const FillCommandOptions& options, Session& session) {
   if (options.from_s.has_value() != options.to_s.has_value()) {
     throw Error(ErrorKind::usage, {.found = "one of --from and --to", .expected = "both or none"});
   }
-  const Clip clip = read_clip(options.input);
+  std::vector<LostFrames> lost;
+  const Clip clip = read_input(options.input, options.choice, session, &lost);
   LibraryView library(options.library);
   const std::vector<FrameRange> gaps = options.from_s ? std::vector{asked_gap(clip, *options.from_s, *options.to_s)}
-                                                      : found_gaps(clip, options, session);
+                                                      : found_gaps(clip, lost, options, session);
   require_fillable(clip, gaps);
   const FillModel model =
       FillModel::build(library, clip.skeleton, options_for(gaps, clip, options.fill), session.progress());
@@ -154,6 +175,7 @@ void add_fill(CLI::App& app, Session& session) {
   command->add_option("-o,--output", options->output, "The file to write: " + listed(clip_endings_written()))
       ->required();
   command->add_option("--library", options->library, "The library to learn from")->required();
+  add_clip_choice(command, options->choice);
   command->add_option("--from", options->from_s,
                       "First missing time in seconds; else frames are looked for that "
                       "repeat the one before them or are zero, three or more");

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/clip_input.h"
 #include "cli/commands.h"
 #include "cli/json_output.h"
 #include "cli/level_table.h"
@@ -34,6 +35,7 @@ struct InfoOptions {
   std::filesystem::path file;
   std::optional<std::filesystem::path> basis;  // a library, for a stream that was made with one
   std::size_t limit = 100;                     // clips that are listed for people
+  ClipChoice choice;                           // of a clip
   bool json = false;
   std::vector<std::filesystem::path> files;  // all that were named; several only to be compared with each other
   bool repeats = false;
@@ -51,8 +53,15 @@ void draw_clip(const Clip& clip, const std::filesystem::path& picture) {
   write_file_atomically(picture, registration_picture_svg(curves, clip.skeleton, pictured(runs)));
 }
 
+int count_of(const std::vector<LostFrames>& gaps) {
+  int out = 0;
+  for (const LostFrames& gap : gaps) out += gap.last - gap.first + 1;
+  return out;
+}
+
 Json describe_clip(const InfoOptions& options, Session& session) {
-  const Clip clip = read_clip(options.file);
+  std::vector<LostFrames> lost;
+  const Clip clip = read_input(options.file, options.choice, session, &lost);
   session.note_doubts(clip);
   if (!options.pictured_clip.empty()) {
     throw Error(ErrorKind::usage, {.found = "--clip and a file that is a clip", .expected = "--clip with a library"});
@@ -62,6 +71,7 @@ Json describe_clip(const InfoOptions& options, Session& session) {
   return {{"kind", "clip"},
           {"name", clip.name},
           {"frames", clip.frames},
+          {"lost_frames", count_of(lost)},
           {"rate_hz", clip.rate_hz},
           {"duration_s", clip.duration_s()},
           {"joints", clip.skeleton.joint_count()},
@@ -347,6 +357,7 @@ void add_info(CLI::App& app, Session& session) {
   command->add_option("--basis", options->basis, "The library that a stream was encoded with, if it was with one");
   command->add_option("--limit", options->limit, "List at most so many clips; 0: all (--json always lists all)")
       ->capture_default_str();
+  add_clip_choice(command, options->choice);
   command->add_flag("--json", options->json, "Print it as one JSON object");
   CLI::Option* repeats = command->add_flag(
       "--repeats", options->repeats, "Which stretches of the clips repeat others (repeated motion analysis, lin2011)");

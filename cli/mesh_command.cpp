@@ -69,8 +69,15 @@ void add_max_memory(CLI::App& command, std::optional<double>& megabytes) {
       ->check(CLI::Range(1.0, 1e9));
 }
 
-MeshReadOptions reading(const std::optional<double>& megabytes, Session& session) {
+void add_animation(CLI::App& command, std::string& animation) {
+  command.add_option("--animation", animation,
+                     "Of a glTF file with several animations this one, by its name or its number from 1");
+}
+
+MeshReadOptions reading(const std::optional<double>& megabytes, Session& session, const std::string& animation = {}) {
   MeshReadOptions out;
+  out.animation = animation;
+  out.note = [&session](const std::string& what) { session.note(what); };
   if (megabytes) out.most_bytes = static_cast<std::uint64_t>(*megabytes * 1e6);
   out.progress = session.progress();
   return out;
@@ -127,6 +134,7 @@ struct MeshEncodeOptions {
   std::string profile = "standard";
   MeshCodecOptions codec_options;
   std::optional<double> rate_hz;
+  std::string animation;
   std::optional<double> max_memory;
   std::optional<fs::path> library;
   bool json = false;
@@ -134,7 +142,7 @@ struct MeshEncodeOptions {
 
 void run_encode(MeshEncodeOptions& options, Session& session) {
   stop_at_once_unless({});
-  MeshReadOptions read = reading(options.max_memory, session);
+  MeshReadOptions read = reading(options.max_memory, session, options.animation);
   read.rate_hz = options.rate_hz;
   const MeshSequence mesh = read_mesh_sequence(options.input, read);
   options.codec_options.profile = options.profile == "paper" ? MeshProfile::paper : MeshProfile::standard;
@@ -263,12 +271,14 @@ void run_compare(const MeshCompareOptions& options, Session& session) {
 
 struct MeshInfoOptions {
   fs::path file;
+  std::string animation;
   std::optional<double> max_memory;
   bool json = false;
 };
 
 Json describe_sequence(const MeshInfoOptions& options, Session& session) {
-  const MeshReport found = report(read_mesh_sequence(options.file, reading(options.max_memory, session)));
+  const MeshReport found =
+      report(read_mesh_sequence(options.file, reading(options.max_memory, session, options.animation)));
   session.finish_progress();
   return {{"kind", "mesh"},
           {"vertices", found.vertices},
@@ -321,6 +331,7 @@ void add_mesh_encode(CLI::App& mesh, Session& session) {
   command->add_option("--multi-resolution", codec.coarse_vertices,
                       "Code about so many vertices (10000, say); the others follow them");
   command->add_option("--rate", options->rate_hz, "Frames a second, where the files do not tell");
+  add_animation(*command, options->animation);
   add_max_memory(*command, options->max_memory);
   add_library(*command, options->library);
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
@@ -369,6 +380,7 @@ void add_mesh_info(CLI::App& mesh, Session& session) {
   CLI::App* command = mesh.add_subcommand("info", "What a mesh sequence or a stream of one holds");
   const auto options = std::make_shared<MeshInfoOptions>();
   command->add_option("FILE", options->file, "Files of a sequence, or a stream")->required();
+  add_animation(*command, options->animation);
   add_max_memory(*command, options->max_memory);
   command->add_flag("--json", options->json, "Print the result as one JSON object");
   session.files.reads(command, {"FILE"});

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/clip_input.h"
 #include "cli/commands.h"
 #include "cli/device_choice.h"
 #include "cli/json_output.h"
@@ -22,6 +23,7 @@ namespace {
 struct QueryCommandOptions {
   std::filesystem::path library;
   std::string clip;
+  ClipChoice choice;  // where the clip is a file
   QueryOptions query;
   bool no_rerank = false;
   bool windows = false;
@@ -75,7 +77,7 @@ std::vector<Match> nearest(LibraryView& library, ClipCurves curves, const Skelet
 std::vector<Match> find(LibraryView& library, const QueryCommandOptions& options, const Compute& compute,
                         const Progress& progress, Session& session) {
   if (is_file(options.clip, library.library())) {
-    Clip clip = read_clip(options.clip);
+    Clip clip = read_input(options.clip, options.choice, session);
     session.note_doubts(clip);
     progress.check_stop();
     if (!library.space_for(clip.skeleton)) {
@@ -117,6 +119,7 @@ void add_query(CLI::App& app, Session& session) {
       ->add_option("CLIP", options->clip,
                    fmt::format("A clip of the library by its name, or a file ({})", listed(clip_endings_read())))
       ->required();
+  add_clip_choice(command, options->choice);
   command->add_option("-k", options->query.k, "How many")->capture_default_str();
   command->add_flag("--no-rerank,!--rerank", options->no_rerank, "Order by the motion vectors alone, without DTW");
   command->add_option("--candidates", options->query.candidates, "How many the DTW orders again")

@@ -22,14 +22,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<Clip> read_clips(const RepeatReportOptions& options, const Progress& progress) {
+std::vector<Clip> read_all(const RepeatReportOptions& options, Session& session, const Progress& progress) {
   const std::vector<fs::path> files = find_motion_files(options.files);
   std::vector<Clip> out;
   for (std::size_t i = 0; i < files.size(); ++i) {
     progress.at("reading", static_cast<double>(i) / static_cast<double>(files.size()));
     Session::check_stop();
-    out.push_back(read_clip(files[i]));
-    if (out.back().rate_hz == out.front().rate_hz) continue;
+    const auto note = [&](const std::string& what) { session.note(what); };
+    std::vector<Clip> clips = read_clips(files[i], {.note = note});
+    std::ranges::move(clips, std::back_inserter(out));
+    if (std::ranges::all_of(out, [&](const Clip& clip) { return clip.rate_hz == out.front().rate_hz; })) continue;
     throw Error(ErrorKind::bad_input,
                 {.file = files[i].string(),
                  .found = fmt::format("{} frames per second", out.back().rate_hz),
@@ -93,7 +95,7 @@ void print_primaries(const Json& report) {
 
 void report_repeats(const RepeatReportOptions& options, Session& session) {
   const Progress progress = session.progress();
-  const std::vector<Clip> clips = read_clips(options, progress);
+  const std::vector<Clip> clips = read_all(options, session, progress);
   progress.at("analysing", 0);
   const FrameTable table = marker_table(clips);
   const RepeatAnalysis analysis = analyse_repeats(table, {}, progress);

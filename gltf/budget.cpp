@@ -19,7 +19,7 @@ void Budget::take(std::string_view what, std::uint64_t count, std::uint64_t size
       {.file = file_,
        .found = fmt::format("{} that take {:.0f} MB with what is read already", what, wanted / megabyte),
        .expected = fmt::format("at most {:.0f} MB from a file of its size", static_cast<double>(most()) / megabyte),
-       .remedy = "allow more (--max-memory) if the file is to be trusted"});
+       .remedy = remedy_});
 }
 
 }  // namespace kinespace::gltf

@@ -15,8 +15,10 @@ class Budget {
   // of large skinned meshes. `most_bytes`: that many instead.
   static constexpr std::uint64_t times_file = 64, beyond = std::uint64_t{256} << 20;
 
-  Budget(std::string file, std::uint64_t file_bytes, std::optional<std::uint64_t> most_bytes = {})
-      : file_(std::move(file)), file_bytes_(file_bytes), chosen_(most_bytes) {}
+  // `remedy`: what to do where it does not suffice.
+  Budget(std::string file, std::uint64_t file_bytes, std::optional<std::uint64_t> most_bytes = {},
+         std::string remedy = "allow more (--max-memory) if the file is to be trusted")
+      : file_(std::move(file)), file_bytes_(file_bytes), chosen_(most_bytes), remedy_(std::move(remedy)) {}
 
   // `count` things of `size` bytes, of which `what` tells in the message. Throws Error{bad_input} when that is more
   // than what is left.
@@ -31,6 +33,7 @@ class Budget {
   std::string file_;
   std::uint64_t file_bytes_;
   std::optional<std::uint64_t> chosen_;
+  std::string remedy_;
   std::uint64_t taken_ = 0;
 };
 

@@ -11,6 +11,7 @@
 #include "kinespace/gltf/detail/buffers.h"
 #include "kinespace/gltf/detail/fields.h"
 #include "kinespace/gltf/detail/json_shape.h"
+#include "kinespace/gltf/detail/packed_view.h"
 
 namespace kinespace::gltf {
 namespace {
@@ -79,19 +80,30 @@ Json parsed(std::string_view text, const std::string& file, Budget& budget, cons
 
 class DocumentReader {
  public:
-  DocumentReader(const Json& root, const std::filesystem::path& file, Budget& budget, const Progress& progress)
-      : file_(file.string()), root_(root, file_, "file"), budget_(budget), progress_(progress), source_(file, budget) {}
+  DocumentReader(const Json& root, const std::filesystem::path& file, Budget& budget, const Progress& progress,
+                 Content wanted)
+      : file_(file.string()),
+        root_(root, file_, "file"),
+        budget_(budget),
+        progress_(progress),
+        wanted_(wanted),
+        source_(file, budget) {}
 
   Document read(std::optional<std::string_view> binary) && {
     check_version();
     check_extensions();
     read_list("buffers", out_.buffers, [&](const Fields& from, auto& to) { read_buffer(from, binary, to); });
     read_list("bufferViews", out_.views, [&](const Fields& from, auto& to) { read_view(from, to); });
+    unpack_views();
     read_list("accessors", out_.accessors, [&](const Fields& from, auto& to) { read_accessor(from, to); });
-    read_list("meshes", out_.meshes, [&](const Fields& from, auto& to) { read_mesh(from, to); });
+    if (wanted_ == Content::shapes) {
+      read_list("meshes", out_.meshes, [&](const Fields& from, auto& to) { read_mesh(from, to); });
+    }
     read_list("nodes", out_.nodes, [&](const Fields& from, auto& to) { read_node(from, to); });
     read_list("skins", out_.skins, [&](const Fields& from, auto& to) { read_skin(from, to); });
     read_list("animations", out_.animations, [&](const Fields& from, auto& to) { read_animation(from, to); });
+    read_list("scenes", out_.scenes, [&](const Fields& from, auto& to) { read_scene(from, to); });
+    out_.scene = root_.index("scene");
     return std::move(out_);
   }
 
@@ -124,11 +136,11 @@ class DocumentReader {
     for (const Json& name : root_.list("extensionsRequired")) {
       if (!name.is_string()) root_.fail("extensionsRequired", name.type_name(), "names");
       const std::string& extension = name.get_ref<const std::string&>();
-      if (is_harmless_extension(extension)) continue;
-      const bool packed = extension == draco || extension == meshopt;
+      if (is_readable_extension(extension, wanted_)) continue;
       fail(file_, fmt::format("a file that requires {}", extension.substr(0, 80)),
-           "plain glTF 2.0, with KHR_mesh_quantization or extensions of materials, textures and lights at most",
-           packed ? "save it without compression" : "save it without this extension");
+           "plain glTF 2.0, with KHR_mesh_quantization, EXT_meshopt_compression or extensions of materials, textures "
+           "and lights at most",
+           extension == draco ? "save it without compression" : "save it without this extension");
     }
   }
 
@@ -139,6 +151,7 @@ class DocumentReader {
       out = source_.read(std::string(uri), length);
       return;
     }
+    if (is_fallback(from)) return;
     const bool first = out_.buffers.size() == 1;
     if (!first || !binary) from.fail("uri", "nothing", "where the buffer is");
     if (binary->size() < length) {
@@ -149,11 +162,59 @@ class DocumentReader {
     out.assign(binary->begin(), binary->begin() + static_cast<std::ptrdiff_t>(length));
   }
 
-  static void read_view(const Fields& from, BufferView& out) {
+  // The object of EXT_meshopt_compression; null where it is missing.
+  static const Json* packing_of(const Fields& from) {
+    const Json* const extensions = from.find("extensions");
+    if (extensions == nullptr || !extensions->is_object()) return nullptr;
+    const auto found = extensions->find(meshopt);
+    return found == extensions->end() ? nullptr : &*found;
+  }
+
+  // A buffer that stands for what is packed elsewhere, and has no bytes of its own.
+  bool is_fallback(const Fields& from) const {
+    const Json* const packing = packing_of(from);
+    return packing != nullptr && Fields(*packing, file_, "buffers.extensions").flag("fallback");
+  }
+
+  void read_view(const Fields& from, BufferView& out) {
     out = {.buffer = from.need_index("buffer"),
            .offset = from.count("byteOffset", 0),
            .length = from.need_count("byteLength"),
            .stride = from.count("byteStride", 0)};
+    const Json* const packing = packing_of(from);
+    if (packing == nullptr) return;
+    const Fields packed(*packing, file_, "bufferViews.extensions");
+    packed_.push_back({.view = out_.views.size() - 1,
+                       .buffer = packed.need_index("buffer"),
+                       .offset = packed.count("byteOffset", 0),
+                       .length = packed.need_count("byteLength"),
+                       .stride = packed.need_count("byteStride"),
+                       .count = packed.need_count("count"),
+                       .mode = std::string(packed.text("mode")),
+                       .filter = std::string(packed.text("filter"))});
+  }
+
+  void unpack_views() {
+    const std::size_t own = out_.buffers.size();
+    for (const PackedView& packed : packed_) {
+      progress_.check_stop();
+      if (packed.buffer < 0 || static_cast<std::size_t>(packed.buffer) >= own) {
+        fail(file_, fmt::format("bufferView {} packed in buffer {}", packed.view, packed.buffer),
+             fmt::format("fewer than {}", own));
+      }
+      auto bytes = unpacked(packed, out_.buffers[static_cast<std::size_t>(packed.buffer)], file_, budget_);
+      BufferView& view = out_.views[packed.view];
+      const bool attributes = packed.mode == "ATTRIBUTES";
+      view = {.buffer = static_cast<int>(out_.buffers.size()),
+              .length = bytes.size(),
+              .stride = attributes ? packed.stride : view.stride};
+      out_.buffers.push_back(std::move(bytes));
+    }
+  }
+
+  void read_scene(const Fields& from, Scene& out) {
+    out.name = from.text("name");
+    out.nodes = indices(from, "nodes");
   }
 
   void read_accessor(const Fields& from, Accessor& out) const {
@@ -215,6 +276,7 @@ class DocumentReader {
   }
 
   void read_node(const Fields& from, Node& out) {
+    out.name = from.text("name");
     out.mesh = from.index("mesh");
     out.skin = from.index("skin");
     out.children = indices(from, "children");
@@ -233,6 +295,7 @@ class DocumentReader {
 
   void read_animation(const Fields& from, Animation& out) {
     using Interpolation = Animation::Interpolation;
+    out.name = from.text("name");
     read_list(from, "samplers", "animation samplers", out.samplers, [&](const Fields& sampler, Animation::Sampler& to) {
       const std::string_view kind = sampler.text("interpolation");
       to = {.input = sampler.need_index("input"),
@@ -275,13 +338,16 @@ class DocumentReader {
   Fields root_;
   Budget& budget_;
   const Progress& progress_;
+  Content wanted_;
   BufferSource source_;
+  std::vector<PackedView> packed_;
   Document out_;
 };
 
 }  // namespace
 
-bool is_harmless_extension(std::string_view name) {
+bool is_readable_extension(std::string_view name, Content wanted) {
+  if (name == meshopt || (wanted == Content::motion && name == draco)) return true;
   constexpr std::string_view beginnings[] = {
       "KHR_materials_", "KHR_texture_",  "KHR_lights_",      "EXT_texture_",   "EXT_lights_",          "KHR_xmp",
       "MSFT_texture_",  "MSFT_packing_", "ADOBE_materials_", "KHR_techniques", "KHR_mesh_quantization"};
@@ -290,10 +356,10 @@ bool is_harmless_extension(std::string_view name) {
 }
 
 Document read_document(std::string_view bytes, const std::filesystem::path& file, Budget& budget,
-                       const Progress& progress) {
+                       const Progress& progress, Content wanted) {
   const Parts parts = parts_of(bytes, file.string());
   const Json root = parsed(parts.json, file.string(), budget, progress);
-  return DocumentReader(root, file, budget, progress).read(parts.binary);
+  return DocumentReader(root, file, budget, progress, wanted).read(parts.binary);
 }
 
 }  // namespace kinespace::gltf

@@ -66,6 +66,7 @@ struct Placement {
 };
 
 struct Node {
+  std::string name;
   int mesh = -1, skin = -1;
   std::vector<int> children;
   Placement rest;
@@ -87,8 +88,14 @@ struct Animation {
     int sampler = -1, node = -1;
     Path path = Path::translation;
   };
+  std::string name;
   std::vector<Sampler> samplers;
   std::vector<Channel> channels;  // of nodes, and of the four paths
+};
+
+struct Scene {
+  std::string name;
+  std::vector<int> nodes;
 };
 
 struct Document {
@@ -99,16 +106,21 @@ struct Document {
   std::vector<Node> nodes;
   std::vector<Skin> skins;
   std::vector<Animation> animations;
+  std::vector<Scene> scenes;
+  int scene = -1;  // the default one, where the file names it
 };
 
-// Whether a file that requires the extension can be read without knowing it: it changes neither shape nor movement, or
-// it is KHR_mesh_quantization.
-[[nodiscard]] bool is_harmless_extension(std::string_view name);
+// What is wanted of a file. `motion`: nodes, skins and animations; meshes are passed over, however they are packed.
+enum class Content : std::uint8_t { shapes, motion };
 
-// Reads a .gltf or .glb file, whichever the bytes are; buffers beside `file` as gltf/detail/buffers.h has it. In this order:
-// the JSON's depth and size, the extensions that it requires, the rest. Throws Error{bad_input}; Interrupted when
-// `progress` says so.
+// Whether a file that requires the extension can be read for what is wanted: it changes neither shape nor movement, or
+// is one that is known (KHR_mesh_quantization, EXT_meshopt_compression).
+[[nodiscard]] bool is_readable_extension(std::string_view name, Content wanted);
+
+// Reads a .gltf or .glb file, whichever the bytes are; buffers beside `file` as gltf/detail/buffers.h has it; views that
+// EXT_meshopt_compression has packed are unpacked into buffers behind those of the file. In this order: the JSON's depth
+// and size, the extensions that it requires, the rest. Throws Error{bad_input}; Interrupted when `progress` says so.
 [[nodiscard]] Document read_document(std::string_view bytes, const std::filesystem::path& file, Budget& budget,
-                                     const Progress& progress = {});
+                                     const Progress& progress = {}, Content wanted = Content::shapes);
 
 }  // namespace kinespace::gltf

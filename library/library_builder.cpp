@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <iterator>
 #include <map>
 #include <set>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -39,11 +41,39 @@ std::string fingerprint_of(const LibraryBuilderOptions& options) {
 // One file on its way into the library.
 struct Import {
   std::filesystem::path file;
+  std::string animation;  // of a file with several; else empty
+  std::size_t index = 0;  // which of them
   std::string name;
   std::string source_hash;  // of the file and, for AMC, its skeleton file
   std::string tree_hash;
   std::vector<Doubt> doubts;
+  std::vector<std::string> notes;
+  bool resumed = false;  // an earlier build had read it
 };
+
+// The clips of a file, which goes by that name.
+void add_imports_of(const std::filesystem::path& file, const std::string& name, std::vector<Import>& imports) {
+  const std::vector<std::string> clips = clips_of_file(file);
+  for (std::size_t c = 0; c < clips.size(); ++c) {
+    imports.push_back(
+        {.file = file, .animation = clips[c], .index = c, .name = clips.size() > 1 ? name + "." + clips[c] : name});
+  }
+}
+
+// All clips of the files. What cannot be listed goes to `bad`, where it is to be left out.
+std::vector<Import> imports_of(const std::vector<std::filesystem::path>& files, bool leave_out_bad,
+                               std::vector<BadFile>& bad) {
+  const std::vector<std::string> names = clip_names(files);
+  std::vector<Import> out;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (leave_out_bad) {
+      static_cast<void>(read_or_list(bad, files[i], [&] { add_imports_of(files[i], names[i], out); }));
+    } else {
+      add_imports_of(files[i], names[i], out);
+    }
+  }
+  return out;
+}
 
 // Part 0 is kept under the hash itself, and last: where it is, the others are.
 std::string part_key(const std::string& source_hash, int part) {
@@ -56,43 +86,86 @@ std::optional<PreparedClip> kept_import(const Import& import, const LibraryBuild
                          import.file.string());
 }
 
-// Reads a file unless an earlier build did, and keeps what came of it. True when it was there already.
-bool import_file(Import& import, const LibraryBuilderOptions& options, LibraryBuild& build) {
-  import.source_hash = source_hash_of(import.file, options.asf);
-  if (const auto known = kept_import(import, build)) {
-    import.tree_hash = known->skeleton.tree_hash();
-    import.doubts = doubts_about(clip_from_curves(known->curves, known->skeleton));
-    return true;
-  }
-  Clip read = read_clip(import.file, options.asf);
+// True when an earlier build, or another clip of this one, has left what came of the same bytes.
+bool take_kept(Import& import, const LibraryBuild& build) {
+  const auto known = kept_import(import, build);
+  if (!known) return false;
+  import.tree_hash = known->skeleton.tree_hash();
+  import.doubts = doubts_about(clip_from_curves(known->curves, known->skeleton));
+  return true;
+}
+
+void keep(Import& import, Clip read, const LibraryBuilderOptions& options, LibraryBuild& build) {
   import.doubts = doubts_about(read);
   const PreparedClip clip = prepare(std::move(read), options.space.sequences);
   import.tree_hash = clip.skeleton.tree_hash();
   for (int part = prepared_parts(clip); part-- > 0;) {
     build.keep_import(part_key(import.source_hash, part), pack_prepared(clip, part));
   }
-  return false;
 }
 
+// Reads the clips of one file, but for those that are kept already.
+void import_file(std::span<Import> imports, const LibraryBuilderOptions& options, LibraryBuild& build,
+                 const std::set<std::string>& from_before) {
+  std::vector<Import*> missing;
+  for (Import& import : imports) {
+    import.source_hash = source_hash_of(import.file, options.asf, import.animation);
+    const bool kept = take_kept(import, build);
+    import.resumed = kept && from_before.contains(import.source_hash);
+    if (!kept) missing.push_back(&import);
+  }
+  if (missing.empty()) return;
+  const bool one = missing.size() == 1;
+  std::vector<std::string>& notes = imports.front().notes;
+  std::vector<Clip> clips =
+      read_clips(imports.front().file, {.companion = options.asf,
+                                        .animation = one ? missing.front()->animation : std::string(),
+                                        .note = [&](const std::string& what) { notes.push_back(what); }});
+  for (Import* import : missing) keep(*import, std::move(clips.at(one ? 0 : import->index)), options, build);
+}
+
+// The clips of a file stand together.
+std::vector<std::span<Import>> by_file(std::vector<Import>& imports) {
+  std::vector<std::span<Import>> out;
+  for (std::size_t start = 0; start < imports.size();) {
+    std::size_t end = start + 1;
+    while (end < imports.size() && imports[end].file == imports[start].file) ++end;
+    out.push_back(std::span(imports).subspan(start, end - start));
+    start = end;
+  }
+  return out;
+}
+
+// Leaves those in `imports` that could be read.
 int import_files(std::vector<Import>& imports, const LibraryBuilderOptions& options, LibraryBuild& build,
-                 const Progress& progress) {
+                 const Progress& progress, std::vector<BadFile>& bad) {
   // Of an earlier build only: two files of one content in this one are no resuming.
   const std::vector<std::string> keys = build.import_keys();
   const std::set<std::string> from_before(keys.begin(), keys.end());
-  std::vector<char> known(imports.size(), 0);
-  const int count = static_cast<int>(imports.size());
+  const std::vector<std::span<Import>> files = by_file(imports);
+  std::vector<std::vector<BadFile>> faults(files.size());
+  const int count = static_cast<int>(files.size());
   for (int start = 0; start < count; start += clips_per_block) {
     progress.check_stop();
     progress.at("import", static_cast<double>(start) / count);
     const int in_block = std::min(clips_per_block, count - start);
     parallel_for(0, in_block, [&](int i) {
-      Import& import = imports[static_cast<std::size_t>(start + i)];
-      const bool was_there = import_file(import, options, build);
-      known[static_cast<std::size_t>(start + i)] = was_there && from_before.contains(import.source_hash) ? 1 : 0;
+      const auto at = static_cast<std::size_t>(start + i);
+      if (!options.leave_out_bad) return import_file(files[at], options, build, from_before);
+      static_cast<void>(read_or_list(faults[at], files[at].front().file,
+                                     [&] { import_file(files[at], options, build, from_before); }));
     });
   }
   progress.at("import", 1);
-  return static_cast<int>(std::ranges::count(known, 1));
+  std::set<std::filesystem::path> gone;
+  for (const std::vector<BadFile>& fault : faults) {
+    for (const BadFile& file : fault) {
+      gone.insert(file.file);
+      bad.push_back(file);
+    }
+  }
+  std::erase_if(imports, [&](const Import& import) { return gone.contains(import.file); });
+  return static_cast<int>(std::ranges::count(imports, true, &Import::resumed));
 }
 
 // A line a kind: the first clip that it is about, and how many others.
@@ -369,7 +442,7 @@ int drop_unchanged(std::vector<Import>& imports, const Library& library, const L
   const std::size_t before = imports.size();
   std::erase_if(imports, [&](const Import& import) {
     const auto row = library.find_clip(import.name);
-    return row && row->source_hash == source_hash_of(import.file, options.asf);
+    return row && row->source_hash == source_hash_of(import.file, options.asf, import.animation);
   });
   return static_cast<int>(before - imports.size());
 }
@@ -472,15 +545,14 @@ LibraryReport build_library(const std::vector<std::filesystem::path>& files, con
   options.space.validate();
   options.clips.validate();
   for (const auto& file : files) require_different_files(file, target);
-  const std::vector<std::string> names = clip_names(files);
-  std::vector<Import> imports(files.size());
-  for (std::size_t i = 0; i < files.size(); ++i) imports[i] = {.file = files[i], .name = names[i]};
-
   LibraryReport report;
+  std::vector<Import> imports = imports_of(files, options.leave_out_bad, report.bad);
   LibraryBuild build(target, {.fingerprint = fingerprint_of(options), .extend = options.add});
   if (options.add) report.unchanged = drop_unchanged(imports, Library::open_read_only(target), options);
-  report.resumed = import_files(imports, options, build, progress);
+  report.resumed = import_files(imports, options, build, progress, report.bad);
+  if (imports.empty() && report.unchanged == 0) require_no_bad_files(report.bad);
   report.doubts = doubts_of(imports);
+  for (Import& import : imports) std::ranges::move(import.notes, std::back_inserter(report.notes));
 
   std::map<std::string, std::vector<const Import*>> by_tree;
   for (const Import& import : imports) by_tree[import.tree_hash].push_back(&import);

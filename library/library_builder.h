@@ -13,6 +13,7 @@
 #include "kinespace/fpca/clip_space.h"
 #include "kinespace/fpca/space_builder.h"
 #include "kinespace/kernels/device.h"
+#include "kinespace/library/bad_files.h"
 
 namespace kinespace {
 
@@ -22,6 +23,9 @@ struct LibraryBuilderOptions {
   bool by_skeleton = false;                  // one space for each joint tree, instead of an error
   bool add = false;                          // extend the library that is there
   std::optional<std::filesystem::path> asf;  // the skeleton of AMC files; else found beside them
+  // Files that cannot be read are left out and listed in the report; else the first of them is an error. Where none is
+  // left, it is an error, too.
+  bool leave_out_bad = false;
 };
 
 struct LibraryReport {
@@ -44,6 +48,8 @@ struct LibraryReport {
   bool warped = false;        // whether warps of motion that was cut at rests won on held-out clips
   std::int64_t bytes = 0;
   std::vector<std::string> doubts;  // what looks wrong in clips (motion/plausibility.h), a line a kind
+  std::vector<std::string> notes;   // what readers chose or passed over
+  std::vector<BadFile> bad;         // left out
 };
 
 // Every motion file among the arguments: files as they are, folders with all below them; sorted, each once. Throws
@@ -57,6 +63,7 @@ struct LibraryReport {
 // What the name says: its parts between underscores that are no numbers ("walk_happy_012" -> walk, happy).
 [[nodiscard]] std::vector<std::string> labels_of(const std::string& name);
 
+// All clips of the files; of a file that holds several each, named "FILE.ANIMATION".
 [[nodiscard]] LibraryReport build_library(const std::vector<std::filesystem::path>& files,
                                           const std::filesystem::path& target, const LibraryBuilderOptions& options,
                                           const Compute& compute = {}, const Progress& progress = {});

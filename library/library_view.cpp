@@ -20,6 +20,8 @@
 namespace kinespace {
 namespace {
 
+constexpr std::string_view before_animation = " animation ";
+
 bool looks_like_a_file(const std::string& name) {
   const FileFormat* format = find_format(name);
   const bool of_motion = format != nullptr && (format->read != nullptr || !format->instead.empty());
@@ -70,10 +72,11 @@ std::string clip_space_name(const std::string& tree_hash) {
   return "clips " + tree_hash;
 }
 
-std::string source_hash_of(const std::filesystem::path& file, const std::optional<std::filesystem::path>& asf) {
+std::string source_hash_of(const std::filesystem::path& file, const std::optional<std::filesystem::path>& asf,
+                           const std::string& animation) {
   std::string hash;
   for (const auto& part : files_read(file, asf)) hash += hash_of_file(part);
-  return hash;
+  return animation.empty() ? hash : hash + std::string(before_animation) + animation;
 }
 
 LibraryView::LibraryView(const std::filesystem::path& path) : library_(Library::open_read_only(path)) {}
@@ -187,8 +190,11 @@ std::optional<Clip> LibraryView::unchanged_source(const ClipRow& row) const {
   std::error_code ignored;
   if (!is_motion_file(file) || !std::filesystem::is_regular_file(file, ignored)) return std::nullopt;
   try {
-    if (source_hash_of(file) != row.source_hash) return std::nullopt;
-    Clip clip = read_clip(file);
+    const std::size_t named = row.source_hash.find(before_animation);
+    const std::string animation =
+        named == std::string::npos ? "" : row.source_hash.substr(named + before_animation.size());
+    if (source_hash_of(file, {}, animation) != row.source_hash) return std::nullopt;
+    Clip clip = read_clip(file, {.animation = animation});
     if (clip.frames != row.frames) return std::nullopt;
     return clip;
   } catch (const Error&) {

@@ -18,9 +18,11 @@ namespace kinespace {
 [[nodiscard]] std::string sequence_space_name(const std::string& tree_hash);
 [[nodiscard]] std::string clip_space_name(const std::string& tree_hash);
 
-// What ClipRow::source_hash holds: the content_hash of the file, for AMC with that of its skeleton file behind it.
+// What ClipRow::source_hash holds: the content_hash of the file, for AMC with that of its skeleton file behind it, for one
+// of several animations of a file with " animation NAME" behind it.
 [[nodiscard]] std::string source_hash_of(const std::filesystem::path& file,
-                                         const std::optional<std::filesystem::path>& asf = {});
+                                         const std::optional<std::filesystem::path>& asf = {},
+                                         const std::string& animation = {});
 
 class LibraryView {
  public:

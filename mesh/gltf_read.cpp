@@ -8,6 +8,7 @@
 #include "kinespace/base/error.h"
 #include "kinespace/gltf/accessors.h"
 #include "kinespace/gltf/document.h"
+#include "kinespace/gltf/nodes.h"
 #include "kinespace/mesh/detail/gltf_animation.h"
 #include "kinespace/mesh/detail/mesh_formats.h"
 
@@ -31,13 +32,14 @@ constexpr std::size_t stop_stride = 65536;
 
 class Baker {
  public:
-  Baker(const gltf::Document& document, const std::string& file, gltf::Budget& budget, const Progress& progress)
+  Baker(const gltf::Document& document, const std::string& file, gltf::Budget& budget, const Progress& progress,
+        std::size_t animation)
       : document_(document),
         accessors_(document, file, budget),
         budget_(budget),
         progress_(progress),
-        order_(gltf_order(document, accessors_)),
-        animation_(document, accessors_) {
+        tree_(gltf::node_tree(document, accessors_)),
+        animation_(document, accessors_, animation) {
     find_parts();
     for (const gltf::Skin& skin : document_.skins) inverse_binds_.push_back(inverse_binds_of(skin));
   }
@@ -72,9 +74,9 @@ class Baker {
   }
 
   void find_parts() {
-    for (const int n : order_) {
+    for (const int n : tree_.order) {
       const gltf::Node& node = document_.nodes[static_cast<std::size_t>(n)];
-      if (node.mesh < 0) continue;
+      if (node.mesh < 0 || tree_.shown[static_cast<std::size_t>(n)] == 0) continue;
       if (static_cast<std::size_t>(node.mesh) >= document_.meshes.size()) {
         accessors_.fail(fmt::format("mesh {}", node.mesh), fmt::format("fewer than {}", document_.meshes.size()));
       }
@@ -190,7 +192,7 @@ class Baker {
   void add_frame(double time) {
     GltfPose pose = gltf_pose(document_, animation_, time);
     // Parents come first in the order, so every node meets its parent's finished matrix.
-    for (const int n : order_) {
+    for (const int n : tree_.order) {
       for (const int child : document_.nodes[static_cast<std::size_t>(n)].children) {
         auto& local = pose.local[static_cast<std::size_t>(child)];
         local = pose.local[static_cast<std::size_t>(n)] * local;
@@ -254,12 +256,21 @@ class Baker {
   gltf::Accessors accessors_;
   gltf::Budget& budget_;
   const Progress& progress_;
-  std::vector<int> order_;
+  gltf::NodeTree tree_;
   GltfAnimation animation_;
   std::vector<Part> parts_;
   std::vector<std::vector<Eigen::Matrix4d>> inverse_binds_;
   MeshSequence out_;
 };
+
+std::size_t chosen_animation(const gltf::Document& document, const std::string& file, const MeshReadOptions& options) {
+  if (!options.animation.empty()) return gltf::find_animation(document, options.animation, file);
+  if (document.animations.size() > 1 && options.note) {
+    options.note(fmt::format("{}: the first of {} animations is read; --animation takes another by name or number: {}",
+                             file, document.animations.size(), gltf::listed_names(document)));
+  }
+  return 0;
+}
 
 }  // namespace
 
@@ -268,7 +279,8 @@ MeshSequence parse_gltf_mesh(std::string_view bytes, const std::filesystem::path
   const std::string name = file.string();
   gltf::Budget budget(name, bytes.size(), options.most_bytes);
   const gltf::Document document = gltf::read_document(bytes, file, budget, options.progress);
-  MeshSequence out = Baker(document, name, budget, options.progress).bake(options.rate_hz);
+  const std::size_t animation = chosen_animation(document, name, options);
+  MeshSequence out = Baker(document, name, budget, options.progress, animation).bake(options.rate_hz);
   require_valid(out, name);
   return out;
 }

@@ -6,11 +6,11 @@
 //   OBJ    a folder with a file for each frame, in the natural order of their names (f2 before f10), or one file. `v`
 //          and `f` are read, polygons are cut into fans; the rest is ignored.
 //   PLY    the same, binary of either byte order: vertices with x, y, z; faces with vertex_indices or vertex_index.
-//   glTF   .gltf or .glb, baked: nodes, skins and morph targets of the first animation (or the rest pose, one frame)
-//          for every node with triangles in the file, at `rate_hz`; where all samplers share evenly spaced times, at
+//   glTF   .gltf or .glb, baked: nodes, skins and morph targets of one animation (or the rest pose, one frame) for
+//          every node with triangles in the default scene, at `rate_hz`; where all samplers share evenly spaced times, at
 //          those. Written as one mesh with a morph target a frame. Buffers in the file or in files of its folder
-//          (gltf/detail/buffers.h); pictures are not looked at. Not read: files that require Draco, meshopt or another
-//          extension that changes shapes.
+//          (gltf/detail/buffers.h); pictures are not looked at. Views packed by meshopt are unpacked; not read: files
+//          that require Draco or another extension that changes shapes.
 //
 // The rate of what does not tell one is MeshSequence::usual_rate_hz. Every frame must have the vertices and triangles
 // of the first, in the same order: another count or order is an Error{bad_input} that names file and frame. Sizes are
@@ -19,7 +19,9 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <string>
 
 #include "kinespace/base/progress.h"
 #include "kinespace/mesh/mesh_sequence.h"
@@ -39,6 +41,10 @@ struct MeshReadOptions {
   // Bytes that may be made from one glTF file, all together. By default 64 times the file and 256 MiB, so that a small
   // file cannot fill the memory; long animations of large skinned meshes need more.
   std::optional<std::uint64_t> most_bytes;
+  // Of a glTF file with several: by name, or by number from 1; the first when empty.
+  std::string animation;
+  // Told what was chosen where there is a choice.
+  std::function<void(const std::string& what)> note;
   Progress progress;
 
   // Throws Error{usage} naming field, value and legal range.

@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "kinespace/base/file.h"
 #include "kinespace/motion/detail/motion_builder.h"
 #include "kinespace/motion/euler.h"
@@ -67,9 +69,10 @@ void turn_axes(const Eigen::Quaterniond& c, double* wxyz, int count) {
 
 class AmcParser {
  public:
-  AmcParser(const TextSource& source, const Asf& asf, std::string name)
+  AmcParser(const TextSource& source, const Asf& asf, std::string name, const ClipReadOptions& options)
       : source_(source),
         asf_(asf),
+        options_(options),
         at_(source.begin()),
         radians_(asf.radians),
         layout_(lay_out(asf)),
@@ -82,20 +85,26 @@ class AmcParser {
       if (!asf.bones[j].dofs.empty()) ++wanted_;
     }
     read_head();
-    const std::int64_t frames = honest_frames();
+    const std::int64_t frames = options.strict ? honest_frames() : numbered_frames(honest_frames());
     require_honest_size(source, asf.bones.size(), frames);
-    clip_ = make_clip(std::move(name), asf.skeleton, rate_hz_, static_cast<int>(frames));
+    clip_ = make_clip(std::move(name), asf.skeleton, rate_of_clip(), static_cast<int>(frames));
     for (const BoneColumns& columns : layout_) {
       if (columns.moves) translations_.emplace_back(columns.joint, clip_.frames);
     }
   }
 
   Clip parse() && {
-    for (int frame = 0; next_line(); ++frame) {
-      if (frame == clip_.frames) source_.fail(at_, "line ends of several kinds", "the same in all lines");
+    int frame = 0;
+    while (next_line()) {
+      const std::int64_t missing = frame_number(frame);
+      if (frame + missing >= clip_.frames) source_.fail(at_, "line ends of several kinds", "the same in all lines");
+      if (missing > 0 && options_.lost) options_.lost(frame, frame + static_cast<int>(missing) - 1);
+      for (std::int64_t i = 0; i < missing; ++i, ++frame) {
+        hold(frame % block_.rows());
+        end_frame(frame);
+      }
       read_frame(frame);
-      const int row = frame % block_.rows();
-      if (row + 1 == block_.rows() || frame + 1 == clip_.frames) store(frame - row, row + 1);
+      end_frame(frame++);
     }
     finish_translations(std::move(translations_), clip_);
     return std::move(clip_);
@@ -142,18 +151,22 @@ class AmcParser {
   // The lines from here on that hold a frame's number. memchr finds line ends several times as fast as a loop; a file
   // without LF has CR alone.
   [[nodiscard]] std::int64_t count_frame_lines() const {
+    std::int64_t frames = 0;
+    for_each_frame_line([&](const char* /*at*/) { ++frames; });
+    return frames;
+  }
+  template <typename Visit>
+  void for_each_frame_line(const Visit& visit) const {
     const char* const end = source_.end();
     const auto find = [end](const char* from, char c) {
       const void* const found = from == end ? nullptr : std::memchr(from, c, static_cast<std::size_t>(end - from));
       return found != nullptr ? static_cast<const char*>(found) : end;
     };
     const char line_end = find(at_, '\n') != end ? '\n' : '\r';
-    std::int64_t frames = 0;
     for (const char* p = at_; p != end; p = find(p, line_end)) {
       while (p != end && is_space(*p)) ++p;
-      if (p != end && is_digit(*p) && is_frame_line(p)) ++frames;
+      if (p != end && is_digit(*p) && is_frame_line(p)) visit(p);
     }
-    return frames;
   }
 
   // How many frames to make room for: no more than the file can hold, whatever it claims. A file with more frame lines
@@ -169,8 +182,63 @@ class AmcParser {
                                     std::min<std::int64_t>(possible, std::numeric_limits<int>::max()));
   }
 
+  // Stores the block when it is full.
+  void end_frame(int frame) {
+    const int row = frame % block_.rows();
+    if (row + 1 < block_.rows() && frame + 1 < clip_.frames) return;
+    last_.resize(dof_count(asf_));
+    for (std::size_t c = 0; c < last_.size(); ++c) last_[c] = block_.data(c)[row];
+    store(frame - row, row + 1);
+  }
+
+  // A frame that is not there: the one before it.
+  void hold(int row) {
+    const std::size_t columns = dof_count(asf_);
+    for (std::size_t c = 0; c < columns; ++c) block_.data(c)[row] = row > 0 ? block_.data(c)[row - 1] : last_[c];
+  }
+
+  // How the numbers of frames go up, before any frame is read: by a step of their own, or with gaps. Where they do
+  // neither, reading finds the place.
+  std::int64_t numbered_frames(std::int64_t lines) {
+    std::int64_t first = -1, last = -1, least = 0, most = 0;
+    for_each_frame_line([&](const char* at) {
+      std::int64_t number = 0;
+      const auto [stop, code] = std::from_chars(at, source_.end(), number);
+      if (code != std::errc()) number = last;  // told when it is read
+      if (first < 0) {
+        first = number;
+      } else {
+        const std::int64_t step = number - last;
+        least = least == 0 ? step : std::min(least, step);
+        most = std::max(most, step);
+      }
+      last = number;
+    });
+    if (least < 1 || (least == 1 && most == 1)) return lines;
+    step_ = least;
+    if (least == most) {
+      note(fmt::format("frame numbers go up by {}: the clip is at {:.6g} Hz, not {:.6g}", least, rate_of_clip(),
+                       rate_hz_));
+      return lines;
+    }
+    // A number that is damaged is no gap.
+    constexpr std::int64_t most_a_frame = 64, always = 1000;
+    const std::int64_t all = (last - first) / least + 1;
+    gaps_ = all > lines && all <= most_a_frame * lines + always && all <= std::numeric_limits<int>::max();
+    if (gaps_) {
+      note(fmt::format("{} frames are not there, by the frame numbers: the frame before stands there", all - lines));
+      return all;
+    }
+    return lines;
+  }
+
+  void note(const std::string& what) const {
+    if (options_.note) options_.note(source_.name() + ": " + what);
+  }
+
+  [[nodiscard]] double rate_of_clip() const { return options_.rate_hz.value_or(rate_hz_ / static_cast<double>(step_)); }
+
   void read_frame(int frame) {
-    frame_number(frame);
     int previous = 0;  // 0: the line of the frame number; else the joint of the line before, plus one
     std::size_t found = 0;
     while (next_line() && !at_frame_number()) {
@@ -190,7 +258,8 @@ class AmcParser {
     return is_digit(*at_) && std::ranges::all_of(word_at(at_, source_.end()), is_digit);
   }
 
-  void frame_number(int frame) {
+  // How many frames are left out before it.
+  std::int64_t frame_number(int frame) {
     std::int64_t number = 0;
     const auto word = word_at(at_, source_.end());
     const auto [stop, code] = std::from_chars(word.data(), word.data() + word.size(), number);
@@ -199,11 +268,14 @@ class AmcParser {
     if (code != std::errc() || stop != word.data() + word.size() || (rest != source_.end() && !is_line_end(*rest))) {
       source_.fail_at_word(at_, "a frame number on a line of its own");
     }
-    if (frame > 0 && number != number_ + 1) {
-      source_.fail_at_word(at_, "frame number " + std::to_string(number_ + 1), "the file has lost frames");
+    const std::int64_t steps = frame == 0 ? 1 : (number - number_) / step_;
+    const bool whole = frame == 0 || (number > number_ && (number - number_) % step_ == 0);
+    if (!whole || (!gaps_ && steps != 1)) {
+      source_.fail_at_word(at_, "frame number " + std::to_string(number_ + step_), "the file has lost frames");
     }
     number_ = number;
     at_ = rest;
+    return steps - 1;
   }
 
   // The joint named at the start of the line. Files list bones in the same order in every frame: try that first.
@@ -303,6 +375,7 @@ class AmcParser {
 
   const TextSource& source_;
   const Asf& asf_;
+  const ClipReadOptions& options_;
   const char* at_;
   bool radians_;
   double rate_hz_ = usual_rate_hz;
@@ -314,21 +387,24 @@ class AmcParser {
   std::unordered_map<std::string_view, int> joint_of_;
   std::size_t wanted_ = 0;
   std::int64_t number_ = 0;
+  std::int64_t step_ = 1;     // from one frame number to the next
+  bool gaps_ = false;         // frames are left out
+  std::vector<double> last_;  // the last row of the block before
   Clip clip_;
   std::vector<TranslationBuilder> translations_;
 };
 
 }  // namespace
 
-Clip parse_amc(std::string_view text, const Asf& asf, const std::string& source_name) {
+Clip parse_amc(std::string_view text, const Asf& asf, const std::string& source_name, const ClipReadOptions& options) {
   const TextSource source(text, source_name);
-  return AmcParser(source, asf, std::filesystem::path(source_name).stem().string()).parse();
+  return AmcParser(source, asf, std::filesystem::path(source_name).stem().string(), options).parse();
 }
 
-Clip read_amc(const std::filesystem::path& amc, const std::filesystem::path& asf) {
+Clip read_amc(const std::filesystem::path& amc, const std::filesystem::path& asf, const ClipReadOptions& options) {
   const Asf skeleton = read_asf(asf);
   const FileContent file(amc);
-  return parse_amc(file.text(), skeleton, amc.string());
+  return parse_amc(file.text(), skeleton, amc.string(), options);
 }
 
 namespace {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
+#include "kinespace/base/error.h"
 #include "kinespace/base/file.h"
 #include "kinespace/motion/detail/bvh_hierarchy.h"
 #include "kinespace/motion/detail/motion_builder.h"
@@ -45,24 +47,46 @@ std::size_t channel_count(const Skeleton& skeleton) {
   return count;
 }
 
-[[noreturn]] void fail_in_row(const TextSource& source, const char* at, std::size_t column, std::size_t width) {
-  if (at == source.end() || is_line_end(*at)) {
-    source.fail(at, std::to_string(column) + " numbers in the line", std::to_string(width),
-                at == source.end() ? "the file is cut short" : "");
+// Where a line stops being a row of numbers.
+struct BadPlace {
+  const char* at = nullptr;
+  std::size_t column = 0;
+};
+
+[[noreturn]] void fail_in_row(const TextSource& source, const BadPlace& bad, std::size_t width) {
+  if (bad.at == source.end() || is_line_end(*bad.at)) {
+    source.fail(bad.at, std::to_string(bad.column) + " numbers in the line", std::to_string(width),
+                bad.at == source.end() ? "the file is cut short" : "");
   }
-  source.fail_at_word(at, "a finite number between -1e9 and 1e9");
+  source.fail_at_word(bad.at, "a finite number between -1e9 and 1e9");
 }
 
-// The numbers of one line into row `row` of the block. Returns the end of the line.
-const char* parse_row(const TextSource& source, const char* at, ColumnBlock& block, std::size_t width, int row) {
+// "nan", as programs write it for what they have lost.
+bool is_nan_word(std::string_view word) {
+  if (word.starts_with('-') || word.starts_with('+')) word.remove_prefix(1);
+  return same_word(word, "nan") || same_word(word, "nan(ind)") || same_word(word, "1.#ind") ||
+         same_word(word, "1.#qnan");
+}
+
+// The numbers of one line into row `row` of the block. Returns the end of the line; null, with the place, at what is no
+// number. `lost` is set where a number is "nan", if it may be.
+const char* parse_row(const TextSource& source, const char* at, ColumnBlock& block, std::size_t width, int row,
+                      BadPlace& bad, bool* lost) {
   const char* const end = source.end();
   double* out = block.data(0) + row;
   const int stride = block.rows();
   for (std::size_t column = 0; column < width; ++column, out += stride) {
     while (at != end && is_blank(*at)) ++at;
-    const char* const next = scan_number(at, end, *out);
+    const char* next = scan_number(at, end, *out);
     if (next == nullptr || !(next == end || is_space(*next)) || !(std::abs(*out) <= largest_number)) [[unlikely]] {
-      fail_in_row(source, at, column, width);
+      const std::string_view word = word_at(at, end);
+      if (lost == nullptr || !is_nan_word(word)) {
+        bad = {at, column};
+        return nullptr;
+      }
+      *lost = true;
+      *out = 0;
+      next = at + word.size();
     }
     at = next;
   }
@@ -76,16 +100,22 @@ const char* parse_row(const TextSource& source, const char* at, ColumnBlock& blo
 
 class MotionParser {
  public:
-  MotionParser(TextSource& source, BvhHeader header, std::string name)
+  MotionParser(TextSource& source, BvhHeader header, std::string name, const ClipReadOptions& options)
       : source_(source),
+        options_(options),
         at_(header.data),
-        frames_(header.frames),
+        said_(header.frames),
+        frames_(std::max(header.frames, 1)),
         width_(channel_count(header.skeleton)),
         layout_(lay_out(header.skeleton)),
         block_(width_) {
     if (width_ == 0) source.fail(at_, "a skeleton without channels", "channels of at least one joint");
     // Every number takes a digit and a separator: a count that the file cannot hold is found before it costs memory.
-    if (static_cast<std::size_t>(frames_) > source.remaining(at_) / (2 * width_) + 1) fail_count(0);
+    const std::size_t possible = source.remaining(at_) / (2 * width_) + 1;
+    if (static_cast<std::size_t>(frames_) > possible) {
+      if (options_.strict) fail_count(0);
+      frames_ = static_cast<int>(possible);
+    }
     require_honest_size(source, header.skeleton.joints.size(), frames_);
     zeros_.assign(static_cast<std::size_t>(block_.rows()), 0);
     clip_ = make_clip(std::move(name), std::move(header.skeleton), header.rate_hz, frames_);
@@ -95,20 +125,115 @@ class MotionParser {
   }
 
   Clip parse() && {
-    for (int first = 0; first < frames_; first += block_.rows()) {
-      const int count = std::min(block_.rows(), frames_ - first);
-      for (int row = 0; row < count; ++row) {
-        if (!next_line()) fail_count(first + row);
-        at_ = parse_row(source_, at_, block_, width_, row);
-      }
-      store(first, count);
+    while (next_line()) {
+      if (rows_ == frames_) grow();
+      const int row = rows_ % block_.rows();
+      if (!read_row(row)) break;
+      if (row + 1 < block_.rows()) continue;
+      store(rows_ - block_.rows(), block_.rows());
+      keep_last_row();
     }
-    if (next_line()) fail_count(frames_);
+    if (rows_ == 0 && said_ > 0) fail_count(0);
+    if (const int rest = rows_ % block_.rows(); rest != 0) store(rows_ - rest, rest);
+    note_lost();
+    if (rows_ != said_ || rows_ == 0) count_is_wrong();
+    if (rows_ < frames_) clip_ = slice(clip_, 0, std::max(rows_, 1));
     finish_translations(std::move(translations_), clip_);
     return std::move(clip_);
   }
 
  private:
+  void note(const std::string& what) const {
+    if (options_.note) options_.note(source_.name() + ": " + what);
+  }
+
+  void count_is_wrong() {
+    if (options_.strict) fail_count(rows_);
+    if (said_ == 0 && rows_ == 0) return note("no frames; the rest pose is read, one frame");
+    note(std::to_string(rows_) + " whole frames of data, not " + std::to_string(said_) +
+         " as \"Frames:\" says: " + (rows_ < said_ ? "there are no more" : "all are read"));
+  }
+
+  // Room for more frames than there was to be.
+  void grow() {
+    if (options_.strict) fail_count(rows_);
+    const auto possible = static_cast<std::int64_t>(source_.remaining(at_) / (2 * width_) + 1);
+    const std::int64_t wanted = std::min<std::int64_t>(rows_ + std::min<std::int64_t>(possible, std::max(rows_, 256)),
+                                                       std::numeric_limits<int>::max());
+    if (wanted <= rows_) source_.fail(at_, "more frames than can be counted", "at most 2147483647");
+    require_honest_size(source_, clip_.skeleton.joints.size(), wanted);
+    Clip larger = make_clip(clip_.name, clip_.skeleton, clip_.rate_hz, static_cast<int>(wanted));
+    for (int j = 0; j < clip_.skeleton.joint_count(); ++j) {
+      std::ranges::copy(clip_.rotation_track(j), larger.rotation_track(j).begin());
+    }
+    clip_ = std::move(larger);
+    frames_ = static_cast<int>(wanted);
+  }
+
+  // Into row `row` of the block. False where the file ends within the line, which is left out then.
+  bool read_row(int row) {
+    BadPlace bad;
+    bool lost = false;
+    const char* const end = parse_row(source_, at_, block_, width_, row, bad, options_.strict ? nullptr : &lost);
+    if (end == nullptr) {
+      if (options_.strict || rows_ == 0 || !ends_within(bad)) fail_in_row(source_, bad, width_);
+      note("the last line is cut short and left out");
+      return false;
+    }
+    at_ = end;
+    if (lost) {
+      hold(row);
+    } else {
+      end_lost();
+      if (!begun_) begin_with(row);
+    }
+    ++rows_;
+    return true;
+  }
+
+  // Whether nothing follows what is cut: the word that is no number ends the text, or the line does.
+  bool ends_within(const BadPlace& bad) {
+    const char* rest = bad.at + word_at(bad.at, source_.end()).size();
+    if (rest != bad.at && rest != source_.end()) return false;
+    while (rest != source_.end() && is_space(*rest)) ++rest;
+    return source_.remaining(rest) == 0;
+  }
+
+  // What a lost frame's row holds: the one before, once there is one.
+  void hold(int row) {
+    if (lost_from_ < 0) lost_from_ = rows_;
+    ++lost_;
+    if (!begun_) return;
+    for (std::size_t c = 0; c < width_; ++c) block_.data(c)[row] = row > 0 ? block_.data(c)[row - 1] : last_[c];
+  }
+
+  // The first frame that is there stands for lost ones before it, too.
+  void begin_with(int row) {
+    begun_ = true;
+    if (rows_ > row) source_.fail(at_, std::to_string(rows_) + " lost frames", "a first frame that is there");
+    for (std::size_t c = 0; c < width_; ++c) std::fill_n(block_.data(c), row, block_.data(c)[row]);
+  }
+
+  void keep_last_row() {
+    last_.resize(width_);
+    for (std::size_t c = 0; c < width_; ++c) last_[c] = block_.data(c)[block_.rows() - 1];
+  }
+
+  void end_lost() {
+    if (lost_from_ < 0) return;
+    if (options_.lost) options_.lost(lost_from_, rows_ - 1);
+    lost_from_ = -1;
+    ++gaps_;
+  }
+
+  void note_lost() {
+    if (rows_ > 0 && !begun_) source_.fail(at_, "nothing but lost frames", "numbers");
+    end_lost();
+    if (lost_ == 0) return;
+    note(std::to_string(lost_) + " lost frames (nan) in " + std::to_string(gaps_) + (gaps_ == 1 ? " gap" : " gaps") +
+         ": the frame before stands there");
+  }
+
   // Goes to the next line with something in it, all of which is in hand then; false at the end.
   bool next_line() {
     do {
@@ -123,10 +248,10 @@ class MotionParser {
   [[noreturn]] void fail_count(std::int64_t before) {
     const std::int64_t line = source_.line_of(at_);
     const std::int64_t found = before + count_lines();
-    const bool short_of = found < frames_;
+    const bool short_of = found < said_;
     source_.fail_in_line(short_of ? source_.line_of(at_) : line,
                          std::to_string(found) + (found == 1 ? " frame" : " frames") + " of data",
-                         std::to_string(frames_) + " as \"Frames:\" says",
+                         std::to_string(said_) + " as \"Frames:\" says",
                          short_of ? "the file is cut short" : "correct the frame count");
   }
 
@@ -168,8 +293,15 @@ class MotionParser {
   }
 
   TextSource& source_;
+  const ClipReadOptions& options_;
   const char* at_;
-  int frames_;
+  int said_;                  // as "Frames:" has it
+  int frames_;                // that there is room for
+  int rows_ = 0;              // that have been read
+  bool begun_ = false;        // a frame that is there has been read
+  int lost_from_ = -1;        // the first of the lost frames that the reader is in
+  int lost_ = 0, gaps_ = 0;   // in all
+  std::vector<double> last_;  // the last row of the block before
   std::size_t width_;
   std::vector<JointColumns> layout_;
   ColumnBlock block_;
@@ -178,20 +310,91 @@ class MotionParser {
   std::vector<TranslationBuilder> translations_;
 };
 
-}  // namespace
-
-Clip parse_bvh(TextSource& source) {
-  return MotionParser(source, parse_bvh_header(source), std::filesystem::path(source.name()).stem().string()).parse();
+// Joints [first, end) of a clip that has several roots, as the clip NAME.number.
+Clip tree_of(const Clip& all, int first, int end, int number) {
+  Skeleton skeleton;
+  for (int j = first; j < end; ++j) {
+    Joint joint = all.skeleton.joints[static_cast<std::size_t>(j)];
+    if (joint.parent >= 0) joint.parent -= first;
+    skeleton.joints.push_back(std::move(joint));
+  }
+  Clip out = make_clip(all.name + "." + std::to_string(number), std::move(skeleton), all.rate_hz, all.frames);
+  for (int j = first; j < end; ++j) std::ranges::copy(all.rotation_track(j), out.rotation_track(j - first).begin());
+  for (const Clip::TranslationTrack& track : all.translations) {
+    if (track.joint >= first && track.joint < end) out.translations.push_back({track.joint - first, track.values});
+  }
+  return out;
 }
 
-Clip parse_bvh(std::string_view text, const std::string& source_name) {
+// By the number, or the name of the root.
+std::vector<Clip> chosen_tree(std::vector<Clip> trees, const std::string& file, const ClipReadOptions& options,
+                              ClipsWanted wanted) {
+  if (trees.size() == 1 && (options.animation.empty() || options.animation == "1")) return trees;
+  if (options.animation.empty() && wanted == ClipsWanted::all) return trees;
+  std::size_t which = 0;
+  if (options.animation.empty()) {
+    if (options.note) {
+      options.note(file + ": the first of " + std::to_string(trees.size()) +
+                   " skeletons is read; --animation takes another by the name of its ROOT or its number");
+    }
+  } else {
+    for (which = 0; which < trees.size(); ++which) {
+      const bool named = trees[which].skeleton.joints.front().name == options.animation;
+      if (named || std::to_string(which + 1) == options.animation) break;
+    }
+    if (which == trees.size()) {
+      throw Error(ErrorKind::bad_input, {.file = file,
+                                         .found = "no skeleton \"" + options.animation + "\"",
+                                         .expected = trees.size() == 1 ? "nothing: it holds one clip"
+                                                                       : "the name of a ROOT, or a number from 1 to " +
+                                                                             std::to_string(trees.size()),
+                                         .remedy = trees.size() == 1 ? "leave --animation out" : ""});
+    }
+  }
+  std::vector<Clip> out;
+  out.push_back(std::move(trees[which]));
+  return out;
+}
+
+}  // namespace
+
+std::vector<Clip> parse_bvh(TextSource& source, const ClipReadOptions& options) {
+  BvhHeader header = parse_bvh_header(source, options);
+  const std::vector<int> roots = header.roots;
+  Clip all =
+      MotionParser(source, std::move(header), std::filesystem::path(source.name()).stem().string(), options).parse();
+  std::vector<Clip> out;
+  if (roots.size() == 1) {
+    out.push_back(std::move(all));
+    return out;
+  }
+  for (std::size_t r = 0; r < roots.size(); ++r) {
+    const int end = r + 1 < roots.size() ? roots[r + 1] : all.skeleton.joint_count();
+    out.push_back(tree_of(all, roots[r], end, static_cast<int>(r) + 1));
+  }
+  return out;
+}
+
+Clip parse_bvh(std::string_view text, const std::string& source_name, const ClipReadOptions& options) {
   TextSource source(text, source_name);
-  return parse_bvh(source);
+  return std::move(chosen_tree(parse_bvh(source, options), source_name, options, ClipsWanted::one).front());
+}
+
+std::vector<Clip> read_bvh(const std::filesystem::path& path, const ClipReadOptions& options, ClipsWanted wanted) {
+  TextSource source(path);
+  return chosen_tree(parse_bvh(source, options), path.string(), options, wanted);
 }
 
 Clip read_bvh(const std::filesystem::path& path) {
-  TextSource source(path);
-  return parse_bvh(source);
+  return std::move(read_bvh(path, {}, ClipsWanted::one).front());
+}
+
+std::vector<std::string> bvh_clips(const std::filesystem::path& path) {
+  const TextSource source(path);
+  const std::size_t roots = parse_bvh_header(source, {}).roots.size();
+  std::vector<std::string> out;
+  for (std::size_t r = 1; r <= roots; ++r) out.push_back(std::to_string(r));
+  return out;
 }
 
 namespace {

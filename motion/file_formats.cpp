@@ -13,20 +13,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view gltf_instead = "a glTF file, which is written only";
-constexpr std::string_view gltf_remedy = "give the clip that it was made of";
-constexpr std::string_view export_remedy = "export it as .bvh";
+constexpr std::string_view export_remedy = "export it as .bvh or .glb";
+
+// A reader of files that are one clip each.
+template <Clip (*read)(const fs::path& path, const ClipReadOptions& options)>
+std::vector<Clip> one_clip(const fs::path& path, const ClipReadOptions& options, ClipsWanted /*wanted*/) {
+  std::vector<Clip> out;
+  out.push_back(read(path, options));
+  return out;
+}
+
+Clip amc_clip(const fs::path& path, const ClipReadOptions& options) {
+  return read_amc(path, options.companion.value(), options);
+}
 
 constexpr std::array formats = {
-    FileFormat{.ending = ".bvh",
-               .kind = FileKind::bvh,
-               .read = [](const fs::path& path, const fs::path&) { return read_bvh(path); },
-               .write = write_bvh},
-    FileFormat{.ending = ".amc",
-               .kind = FileKind::amc,
-               .read = [](const fs::path& path, const fs::path& skeleton) { return read_amc(path, skeleton); },
-               .write = write_amc,
-               .companion = ".asf"},
+    FileFormat{.ending = ".bvh", .kind = FileKind::bvh, .read = read_bvh, .list = bvh_clips, .write = write_bvh},
+    FileFormat{
+        .ending = ".amc", .kind = FileKind::amc, .read = one_clip<amc_clip>, .write = write_amc, .companion = ".asf"},
     FileFormat{.ending = ".asf",
                .kind = FileKind::asf,
                .instead = "the ending \".asf\"",
@@ -36,16 +40,16 @@ constexpr std::array formats = {
     FileFormat{.ending = ".ply", .kind = FileKind::ply, .holds_meshes = true},
     FileFormat{.ending = ".glb",
                .kind = FileKind::glb,
+               .read = read_gltf,
+               .list = gltf_clips,
                .write = write_gltf,
-               .holds_meshes = true,
-               .instead = gltf_instead,
-               .remedy = gltf_remedy},
+               .holds_meshes = true},
     FileFormat{.ending = ".gltf",
                .kind = FileKind::json,
+               .read = read_gltf,
+               .list = gltf_clips,
                .write = write_gltf,
-               .holds_meshes = true,
-               .instead = gltf_instead,
-               .remedy = gltf_remedy},
+               .holds_meshes = true},
     FileFormat{.ending = ".svg", .kind = FileKind::svg},
     FileFormat{.ending = ".png", .kind = FileKind::png},
     FileFormat{.ending = ".ksm", .kind = FileKind::stream, .instead = "a stream", .remedy = "decode it first"},

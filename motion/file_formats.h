@@ -10,16 +10,21 @@
 
 #include "kinespace/base/file_kind.h"
 #include "kinespace/motion/clip.h"
+#include "kinespace/motion/read_options.h"
 
 namespace kinespace {
 
 struct FileFormat {
-  using ReadClip = Clip (*)(const std::filesystem::path& path, const std::filesystem::path& companion);
+  // options.companion is there when the format has one.
+  using ReadClips = std::vector<Clip> (*)(const std::filesystem::path& path, const ClipReadOptions& options,
+                                          ClipsWanted wanted);
+  using ListClips = std::vector<std::string> (*)(const std::filesystem::path& path);
   using WriteClip = void (*)(const std::filesystem::path& path, const Clip& clip);
 
   std::string_view ending;  // with its dot, in small letters
   FileKind kind = FileKind::other;
-  ReadClip read = nullptr;
+  ReadClips read = nullptr;
+  ListClips list = nullptr;         // the names of a file's clips; null: a file is one clip
   WriteClip write = nullptr;        // with its companion
   bool holds_meshes = false;        // read by mesh/mesh_files.h
   std::string_view companion = {};  // the file it goes with: an ending, or a name in the same folder

@@ -66,13 +66,43 @@ std::pair<std::string, std::string> in_its_place(ErrorKind kind, const std::file
                      .remedy = std::move(remedy)});
 }
 
+const FileFormat& clip_format(const std::filesystem::path& path) {
+  const FileFormat* format = find_format(path);
+  if (format == nullptr || format->read == nullptr) fail_ending(ErrorKind::bad_input, path);
+  return *format;
+}
+
+std::vector<Clip> read_wanted(const std::filesystem::path& path, ClipReadOptions options, ClipsWanted wanted) {
+  const FileFormat& format = clip_format(path);
+  if (!format.companion.empty() && !options.companion) options.companion = companion_of(path, format.companion);
+  if (format.list == nullptr && !options.animation.empty() && options.animation != "1") {
+    throw Error(ErrorKind::usage, {.file = path.string(),
+                                   .found = fmt::format("no animation \"{}\"", options.animation),
+                                   .expected = "a file that can hold several",
+                                   .remedy = "leave --animation out"});
+  }
+  return format.read(path, options, wanted);
+}
+
 }  // namespace
 
 Clip read_clip(const std::filesystem::path& path, const std::optional<std::filesystem::path>& companion) {
-  const FileFormat* format = find_format(path);
-  if (format == nullptr || format->read == nullptr) fail_ending(ErrorKind::bad_input, path);
-  if (format->companion.empty()) return format->read(path, {});
-  return format->read(path, companion ? *companion : companion_of(path, format->companion));
+  return read_clip(path, ClipReadOptions{.companion = companion});
+}
+
+Clip read_clip(const std::filesystem::path& path, const ClipReadOptions& options) {
+  return std::move(read_wanted(path, options, ClipsWanted::one).front());
+}
+
+std::vector<Clip> read_clips(const std::filesystem::path& path, const ClipReadOptions& options) {
+  return read_wanted(path, options, ClipsWanted::all);
+}
+
+std::vector<std::string> clips_of_file(const std::filesystem::path& path) {
+  const FileFormat& format = clip_format(path);
+  std::vector<std::string> out = format.list == nullptr ? std::vector<std::string>() : format.list(path);
+  if (out.size() < 2) out.assign(1, "");
+  return out;
 }
 
 void write_clip(const std::filesystem::path& path, const Clip& clip) {

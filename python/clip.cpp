@@ -180,8 +180,13 @@ std::vector<std::string> codec_names() {
 
 void bind_clips(py::module_& module) {
   bind_clip_class(module);
-  def_documented(module, "read_clip", &read_clip, py::arg("path"), py::arg("asf") = py::none(),
-                 py::call_guard<py::gil_scoped_release>());
+  def_documented(
+      module, "read_clip",
+      [](const fs::path& path, const std::optional<fs::path>& asf, const std::string& animation) {
+        return read_clip(path, {.companion = asf, .animation = animation});
+      },
+      py::arg("path"), py::arg("asf") = py::none(), py::arg("animation") = "",
+      py::call_guard<py::gil_scoped_release>());
   module.def("find_motion_files", &find_motion_files, py::arg("paths"), py::call_guard<py::gil_scoped_release>());
   module.def(
       "clip_names", [](const std::vector<fs::path>& files) { return texts(clip_names(files)); }, py::arg("files"));

@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 namespace kinespace {
 namespace {
 
@@ -93,12 +95,16 @@ class Hierarchy {
  public:
   explicit Hierarchy(HierarchyWords& words) : words_(words) {}
 
-  Skeleton parse() && {
+  // Into the header: the skeleton and its roots.
+  void parse(BvhHeader& header) && {
     words_.require("HIERARCHY", "HIERARCHY, the first word of a BVH file", "check that this is a BVH file");
     words_.require("ROOT", "ROOT and the name of the first joint");
-    open_joint();
-    while (!levels_.empty()) statement();
-    return {.joints = std::move(joints_)};
+    do {
+      header.roots.push_back(static_cast<int>(joints_.size()));
+      open_joint();
+      while (!levels_.empty()) statement();
+    } while (words_.take("ROOT"));
+    header.skeleton.joints = std::move(joints_);
   }
 
  private:
@@ -125,8 +131,8 @@ class Hierarchy {
     const bool in_end_site = levels_.back() == end_site_level;
     if (words_.take("}")) return close();
     if (words_.take("OFFSET")) return offset(in_end_site);
+    if (words_.take("CHANNELS")) return in_end_site ? end_site_channels() : channels();
     if (!in_end_site) {
-      if (words_.take("CHANNELS")) return channels();
       if (words_.take("JOINT")) return open_joint();
       if (words_.take("End")) {
         words_.require("Site", "Site after End");
@@ -134,7 +140,7 @@ class Hierarchy {
         return open(end_site_level);
       }
     }
-    words_.fail(in_end_site ? "OFFSET or }" : "OFFSET, CHANNELS, JOINT, End Site or }",
+    words_.fail(in_end_site ? "OFFSET, CHANNELS or }" : "OFFSET, CHANNELS, JOINT, End Site or }",
                 words_.peek().empty() ? "the file is cut short" : "");
   }
 
@@ -148,6 +154,21 @@ class Hierarchy {
       joint().offset = value;
       has_offset_[static_cast<std::size_t>(levels_.back())] = true;
     }
+  }
+
+  // An End Site that has channels is a joint without a name.
+  void end_site_channels() {
+    const auto word = words_.peek();
+    if (word == "0") return words_.skip(word);
+    const int parent = levels_[levels_.size() - 2];
+    std::optional<Eigen::Vector3d>& site = joints_[static_cast<std::size_t>(parent)].end_site;
+    has_offset_.push_back(site.has_value());
+    levels_.back() = static_cast<int>(joints_.size());
+    Joint end{.name = joints_[static_cast<std::size_t>(parent)].name + " end", .parent = parent};
+    end.offset = site.value_or(Eigen::Vector3d::Zero());
+    site.reset();
+    joints_.push_back(std::move(end));
+    channels();
   }
 
   void channels() {
@@ -191,10 +212,43 @@ void drop_inner_end_sites(Skeleton& skeleton) {
   }
 }
 
-double rate_of(double frame_time) {
+double rate_of_time(double frame_time) {
   const double rate = 1 / frame_time;
   const double whole = std::round(rate);
   return whole >= 1 && std::abs(frame_time * whole - 1) < 5e-5 ? whole : rate;
+}
+
+// The usual rate whose frame time, rounded to the decimals that `word` has, is `frame_time`; 0 when there is none.
+double rate_before_rounding(std::string_view word, double frame_time) {
+  const std::size_t point = word.find('.');
+  const std::size_t decimals = point == std::string_view::npos ? 0 : word.size() - point - 1;
+  if (decimals < 3 || decimals > 9 || !std::ranges::all_of(word.substr(point + 1), is_digit)) return 0;
+  const double scale = std::pow(10.0, static_cast<double>(decimals));
+  for (const double rate : {24.0, 25.0, 30.0, 50.0, 60.0, 72.0, 90.0, 100.0, 120.0, 240.0}) {
+    if (std::round(scale / rate) == std::round(frame_time * scale)) return rate;
+  }
+  return 0;
+}
+
+// What a frame time means. Nobody records a frame in ten seconds: such a number is a rate.
+double rate_of(std::string_view word, double frame_time, const std::string& file, const ClipReadOptions& options) {
+  constexpr double slowest_s = 10, fastest_hz = 1000;
+  const double rate = rate_of_time(frame_time);
+  if (options.strict) return rate;
+  const auto note = [&](double taken) {
+    if (options.note) options.note(fmt::format("{}: frame time {} is taken for {:.6g} Hz", file, word, taken));
+    return taken;
+  };
+  if (frame_time >= slowest_s && frame_time <= fastest_hz) return note(frame_time);
+  const double meant = rate_before_rounding(word, frame_time);
+  return meant > 0 && meant != rate ? note(meant) : rate;
+}
+
+void require_no_utf16(const TextSource& source) {
+  const std::string_view start(source.begin(), std::min<std::size_t>(2, source.remaining(source.begin())));
+  if (start == "\xff\xfe" || start == "\xfe\xff") {
+    source.fail(source.begin(), "text in UTF-16", "ASCII or UTF-8", "save it as UTF-8");
+  }
 }
 
 // "Frames:" and "Time:", with or without space around the colon.
@@ -212,23 +266,29 @@ void require_label(HierarchyWords& words, std::string_view label, const std::str
 
 }  // namespace
 
-BvhHeader parse_bvh_header(const TextSource& source) {
+BvhHeader parse_bvh_header(const TextSource& source, const ClipReadOptions& options) {
+  require_no_utf16(source);
   HierarchyWords words(source);
-  BvhHeader header{.skeleton = Hierarchy(words).parse()};
+  BvhHeader header;
+  Hierarchy(words).parse(header);
   drop_inner_end_sites(header.skeleton);
-  if (same_word(words.peek(), "ROOT")) words.fail("one ROOT", "keep one skeleton a file");
   words.require("MOTION", "MOTION after the hierarchy");
   require_label(words, "Frames", "\"Frames:\" and the number of frames");
-  header.frames = static_cast<int>(
-      words.take_integer("a number of frames from 1 to 2147483647", 1, std::numeric_limits<int>::max()));
+  header.frames = static_cast<int>(words.take_integer("a number of frames from 1 to 2147483647", options.strict ? 1 : 0,
+                                                      std::numeric_limits<int>::max()));
   words.require("Frame", "\"Frame Time:\" and seconds");
   require_label(words, "Time", "\"Frame Time:\" and seconds");
   const std::string positive = "a frame time in seconds between 1e-6 and 1e6";
-  static_cast<void>(words.peek());
+  const std::string_view word = words.peek();
   const char* const at = words.at();
   const double frame_time = words.take_number(positive);
-  if (!(frame_time >= 1e-6 && frame_time <= 1e6)) source.fail_at_word(at, positive);
-  header.rate_hz = rate_of(frame_time);
+  if (options.rate_hz) {
+    header.rate_hz = *options.rate_hz;
+  } else if (!(frame_time >= 1e-6 && frame_time <= 1e6)) {
+    source.fail_at_word(at, positive, "say the rate (--rate)");
+  } else {
+    header.rate_hz = rate_of(word, frame_time, source.name(), options);
+  }
   header.data = words.at();
   while (header.data != source.end() && is_blank(*header.data)) ++header.data;
   if (header.data == source.end() && source.remaining(header.data) > 0) source.fail_beyond_window();

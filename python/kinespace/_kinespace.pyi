@@ -164,8 +164,8 @@ class Encoded(TypedDict):
     mean_joint_error_cm: float
     max_joint_error_cm: float
 
-def read_clip(path: Path, asf: Optional[Path] = None) -> Clip:
-    """Reads a clip by its ending; an .amc with `asf`, else with the .asf beside it."""
+def read_clip(path: Path, asf: Optional[Path] = None, animation: str = "") -> Clip:
+    """Reads a clip by its ending; an .amc with `asf`, else with the .asf beside it; of a glTF file with several animations the first, or that of the name or number `animation`."""
 
 def build_library(paths: Sequence[Path], out: Path, *, add: bool = False, by_skeleton: bool = False, asf: Optional[Path] = None,
                   variance: float = 0.999999, functions: Optional[int] = None, points: int = 0, grouping: str = "all", smooth: bool = False,

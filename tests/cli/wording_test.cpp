@@ -30,7 +30,6 @@ class Wording : public ::testing::Test {
     ASSERT_EQ(run_command({"build", at("clips"), "-o", at("l.kspace")}).code, 0);
     std::filesystem::create_directory(at("more"));
     write_clip(at("more/stroll.bvh"), make_walk({.duration_s = 2}).clip);
-    write_clip(at("walk.glb"), make_walk({.duration_s = 1}).clip);
   }
   static void TearDownTestSuite() { folder_.reset(); }
   static std::string at(const std::string& name) { return (folder_->path() / name).string(); }
@@ -76,18 +75,14 @@ TEST_F(Wording, a_file_where_a_clip_of_the_library_is_asked_for_is_told) {
   EXPECT_THAT(message({"transition", library(), clip, "run_fast_001", "-o", at("o.bvh")}, 2), HasSubstr("build --add"));
 }
 
-TEST_F(Wording, folders_and_gltf_are_called_so) {
+TEST_F(Wording, folders_are_called_so) {
   for (const std::string command : {"info", "compare", "convert", "clean"}) {
     std::vector<std::string> arguments{command, at("clips")};
     if (command == "compare") arguments.push_back(at("clips"));
     if (command == "convert") arguments.push_back(at("o.bvh"));
     if (command == "clean") arguments.insert(arguments.end(), {"-o", at("o.bvh")});
     EXPECT_THAT(message(arguments, 1), HasSubstr("a folder, expected a motion file"));
-    arguments[1] = at("walk.glb");
-    if (command == "compare") arguments[2] = at("walk.glb");
-    EXPECT_THAT(message(arguments, 1), HasSubstr("a glTF file, which is written only"));
   }
-  EXPECT_THAT(message({"query", library(), at("walk.glb")}, 1), HasSubstr("a glTF file"));
   EXPECT_THAT(message({"query", library(), at("clips")}, 1), HasSubstr("a folder"));
   EXPECT_THAT(message({"query", at("clips"), "x"}, 1), HasSubstr("a folder"));
 }

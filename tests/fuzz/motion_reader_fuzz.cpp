@@ -1,4 +1,5 @@
-// A libFuzzer target for one reader of motion files or libraries, KINESPACE_FUZZ_READER: bvh, asf, amc or library.
+// A libFuzzer target for one reader of motion files or libraries, KINESPACE_FUZZ_READER: bvh, asf, amc, gltf_clip or
+// library.
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
@@ -17,6 +18,7 @@
 #include "kinespace/motion/amc.h"
 #include "kinespace/motion/asf.h"
 #include "kinespace/motion/bvh.h"
+#include "kinespace/motion/gltf.h"
 #include "kinespace/motion/read.h"
 
 namespace kinespace::fuzz {
@@ -51,6 +53,7 @@ const std::string& good() {
     if (reader == "bvh") return format_bvh(sample_clip());
     if (reader == "asf") return format_amc(sample_clip()).asf;
     if (reader == "amc") return format_amc(sample_clip()).amc;
+    if (reader == "gltf_clip") return format_gltf(sample_clip(), GltfForm::binary);
     return sample_library_bytes();
   }();
   return text;
@@ -77,6 +80,8 @@ void read(std::string_view text) {
     static_cast<void>(parse_asf(text, "fuzzed.asf"));
   } else if (reader == "amc") {
     static_cast<void>(parse_amc(text, skeleton(), "fuzzed.amc"));
+  } else if (reader == "gltf_clip") {
+    static_cast<void>(parse_gltf(text, "fuzzed.glb", {}, ClipsWanted::all));
   } else {
     read_library(text);
   }

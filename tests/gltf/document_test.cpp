@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <meshoptimizer.h>
 
 #include "kinespace/base/error.h"
 #include "kinespace/gltf/detail/json_shape.h"
@@ -54,7 +55,7 @@ TEST(GltfDocument, deep_nesting_is_an_error_wherever_it_is) {
 }
 
 TEST(GltfDocument, extensions_that_change_shapes_are_refused_before_anything_else) {
-  for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing", "X"}) {
+  for (const char* name : {"KHR_draco_mesh_compression", "EXT_mesh_gpu_instancing", "X"}) {
     Json json = triangle_at("gone.bin");
     json["extensionsRequired"] = {"KHR_materials_unlit", name};
     json["accessors"] = 5;  // nothing of it is looked at
@@ -65,6 +66,63 @@ TEST(GltfDocument, extensions_that_change_shapes_are_refused_before_anything_els
     json["extensionsRequired"] = {name};
     EXPECT_EQ(outcome(json.dump()), "read") << name;
   }
+}
+
+// A triangle whose corners and indices are packed by meshopt, the indices in a buffer that has no bytes without it.
+Json packed_triangle(const std::string& positions, const std::string& indices) {
+  Json json = triangle_at(data_uri(positions + indices));
+  json["extensionsRequired"] = {"EXT_meshopt_compression"};
+  json["buffers"][0]["byteLength"] = positions.size() + indices.size();
+  json["buffers"].push_back({{"byteLength", 42}});
+  json["buffers"][1]["extensions"]["EXT_meshopt_compression"]["fallback"] = true;
+  json["bufferViews"] = {{{"buffer", 1}, {"byteLength", 36}}, {{"buffer", 1}, {"byteOffset", 36}, {"byteLength", 6}}};
+  json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"] = {
+      {"buffer", 0}, {"byteLength", positions.size()}, {"byteStride", 12}, {"count", 3}, {"mode", "ATTRIBUTES"}};
+  json["bufferViews"][1]["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},
+                                                                     {"byteOffset", positions.size()},
+                                                                     {"byteLength", indices.size()},
+                                                                     {"byteStride", 2},
+                                                                     {"count", 3},
+                                                                     {"mode", "TRIANGLES"}};
+  return json;
+}
+
+TEST(GltfDocument, views_packed_by_meshopt_are_unpacked) {
+  const std::vector<float> corners{0, 0, 0, 1, 0, 0, 0, 2.5F, 0};
+  const std::vector<unsigned> order{0, 1, 2};
+  std::string positions(meshopt_encodeVertexBufferBound(3, 12), '\0'),
+      indices(meshopt_encodeIndexBufferBound(3, 3), '\0');
+  positions.resize(meshopt_encodeVertexBuffer(reinterpret_cast<unsigned char*>(positions.data()), positions.size(),
+                                              corners.data(), 3, 12));
+  indices.resize(meshopt_encodeIndexBuffer(reinterpret_cast<unsigned char*>(indices.data()), indices.size(),
+                                           order.data(), order.size()));
+  const Json json = packed_triangle(positions, indices);
+  const MeshSequence mesh = parse_gltf_mesh(json.dump(), "/nowhere/x.gltf");
+  EXPECT_EQ(mesh.positions, corners);
+  ASSERT_EQ(mesh.triangles.size(), 1u);
+
+  const auto changed = [&](const char* pointer, Json value) {
+    Json other = json;
+    other[Json::json_pointer(std::string("/bufferViews/0/extensions/EXT_meshopt_compression/") + pointer)] =
+        std::move(value);
+    return outcome(other.dump());
+  };
+  EXPECT_THAT(changed("byteLength", positions.size() - 5), HasSubstr("damage in bufferView 0"));
+  EXPECT_THAT(changed("byteLength", 1000), HasSubstr("bytes of its buffer"));
+  EXPECT_THAT(changed("byteStride", 6), HasSubstr("a multiple of 4"));
+  EXPECT_THAT(changed("mode", "POINTS"), HasSubstr("mode \"POINTS\""));
+  EXPECT_THAT(changed("filter", "QUATERNION"), HasSubstr("8 bytes"));
+  EXPECT_THAT(changed("count", 1e15), HasSubstr("EXT_meshopt_compression packs that take"));
+  EXPECT_THAT(changed("buffer", 9), HasSubstr("fewer than 2"));
+}
+
+TEST(GltfDocument, only_the_default_scene_has_shapes) {
+  Json json = triangle();
+  json["nodes"].push_back({{"mesh", 0}});
+  EXPECT_EQ(parse_gltf_mesh(json.dump(), "/nowhere/x.gltf").vertices, 3);
+  json["scenes"].push_back({{"nodes", {0, 1}}});
+  json["scene"] = 1;
+  EXPECT_EQ(parse_gltf_mesh(json.dump(), "/nowhere/x.gltf").vertices, 6);
 }
 
 TEST(GltfDocument, draco_that_is_only_used_stands_aside_for_plain_accessors) {

@@ -112,7 +112,8 @@ TEST(Amc, a_bone_whose_name_starts_with_a_digit_is_no_frame) {
 
 void expect_error(std::string_view text, int line, const std::string& found, const std::string& expected = "") {
   SCOPED_TRACE(found + " / " + expected);
-  const ErrorDetails error = error_of([&] { static_cast<void>(parse(text)); });
+  const ErrorDetails error =
+      error_of([&] { static_cast<void>(parse_amc(text, parse_asf(small_asf, "t.asf"), "t.amc", {.strict = true})); });
   EXPECT_EQ(error.file, "t.amc");
   EXPECT_EQ(error.line, line);
   EXPECT_THAT(error.found, HasSubstr(found));
@@ -133,6 +134,39 @@ TEST(AmcBadInput, values_that_are_too_few_too_many_or_none) {
   expect_error(replaced(small_amc, "femur 5 -6 8", "femur"), 11, "0 values", "3");
   for (const std::string bad : {"nan", "-inf", "1e10", "1,5", "x", "1e999"}) {
     expect_error(replaced(small_amc, "femur 5 -6 8", "femur 5 " + bad + " 8"), 11, "\"" + bad + "\"", "finite number");
+  }
+}
+
+TEST(Amc, frame_numbers_by_a_step_of_their_own_divide_the_rate) {
+  std::vector<std::string> notes;
+  const std::string text = replaced(replaced(small_amc, "\n1\n", "\n8\n"), "\n2\n", "\n12\n");
+  const ClipReadOptions options{.note = [&](const std::string& what) { notes.push_back(what); }};
+  const Clip clip = parse_amc(text, parse_asf(small_asf, "t.asf"), "t.amc", options);
+  EXPECT_EQ(clip.rate_hz, 30);
+  EXPECT_EQ(clip.rotations, parse(small_amc).rotations);
+  EXPECT_THAT(notes, testing::ElementsAre(testing::HasSubstr("go up by 4")));
+}
+
+TEST(Amc, frames_left_out_are_gaps) {
+  const std::size_t second = small_amc.find("\n2\n") + 1;
+  std::string text(small_amc);
+  for (const int number : {3, 306, 307}) {
+    text += replaced(small_amc.substr(second), "2\n", std::to_string(number) + "\n");
+  }
+  std::vector<std::pair<int, int>> lost;
+  std::vector<std::string> notes;
+  const ClipReadOptions options{.lost = [&](int first, int last) { lost.emplace_back(first, last); },
+                                .note = [&](const std::string& what) { notes.push_back(what); }};
+  const Clip clip = parse_amc(text, parse_asf(small_asf, "t.asf"), "t.amc", options);
+  ASSERT_EQ(clip.frames, 307);
+  EXPECT_EQ(clip.rate_hz, 120);
+  EXPECT_THAT(lost, testing::ElementsAre(testing::Pair(3, 304)));
+  EXPECT_THAT(notes, testing::ElementsAre(testing::HasSubstr("302 frames are not there")));
+  for (int f = 1; f < 307; ++f) {
+    for (int j = 0; j < clip.skeleton.joint_count(); ++j) {
+      ASSERT_TRUE(clip.rotation(j, f).isApprox(clip.rotation(j, 1), 1e-15)) << f << " " << j;
+    }
+    ASSERT_EQ(clip.translation(0, f), clip.translation(0, 1)) << f;
   }
 }
 

@@ -13,7 +13,7 @@ namespace {
 using testing::HasSubstr;
 
 ErrorDetails bvh_error(std::string_view text) {
-  return error_of([&] { static_cast<void>(parse_bvh(text, "bad.bvh")); });
+  return error_of([&] { static_cast<void>(parse_bvh(text, "bad.bvh", {.strict = true})); });
 }
 
 void expect_error(std::string_view text, int line, const std::string& found, const std::string& expected = "") {
@@ -100,9 +100,9 @@ TEST(BvhBadInput, a_hierarchy_out_of_shape) {
   expect_error(replaced(small_bvh, "ROOT Hips", "JOINT Hips"), 2, "\"JOINT\"", "ROOT");
   expect_error(replaced(small_bvh, "    OFFSET 0 60 0\n", ""), 27, "\"Head\" without OFFSET", "OFFSET");
   expect_error(replaced(small_bvh, "End Site", "End Sight"), 14, "\"Sight\"", "Site");
-  expect_error(replaced(small_bvh, "MOTION", "ROOT Second"), 30, "\"ROOT\"", "one ROOT");
+  expect_error(replaced(small_bvh, "MOTION", "ROOT Second"), 31, "\"Frames:\"", "{");
   expect_error(replaced(small_bvh, "MOTION", "}\nMOTION"), 30, "\"}\"", "MOTION");
-  expect_error(replaced(small_bvh, "OFFSET 0 0 15", "JOINT a"), 16, "\"JOINT\"", "OFFSET or }");
+  expect_error(replaced(small_bvh, "OFFSET 0 0 15", "JOINT a"), 16, "\"JOINT\"", "OFFSET, CHANNELS or }");
 }
 
 TEST(BvhBadInput, joints_nested_without_end) {
@@ -117,6 +117,26 @@ TEST(BvhBadInput, a_small_file_that_asks_for_much_memory) {
   greedy += "}\nMOTION\nFrames: 200000\nFrame Time: 1\n";  // 4e9 quaternions, 128 GB, from a file of 1 MB
   for (int i = 0; i < 200000; ++i) greedy += "0\n";
   EXPECT_THAT(bvh_error(greedy).found, HasSubstr("20001 joints in 200000 frames"));
+}
+
+TEST(BvhBadInput, text_in_utf_16) {
+  expect_error(std::string("\xff\xfeH\0I\0", 6), 1, "UTF-16", "UTF-8");
+  expect_error(std::string("\xfe\xff\0H\0I", 6), 1, "UTF-16", "UTF-8");
+}
+
+TEST(BvhBadInput, is_an_error_where_it_cannot_be_mended_either) {
+  const auto lenient = [](std::string_view text) {
+    return error_of([&] { static_cast<void>(parse_bvh(text, "bad.bvh")); });
+  };
+  const std::string header(small_bvh.substr(0, small_bvh.find("0 90 0 0 0 0 10")));
+  EXPECT_THAT(lenient(header).found, HasSubstr("0 frames of data"));
+  EXPECT_THAT(lenient(header + "1 2").found, HasSubstr("2 numbers"));
+  EXPECT_THAT(lenient(with_line(small_bvh, 34, "1 91")).found, HasSubstr("2 numbers"));
+  EXPECT_THAT(lenient(with_line(small_bvh, 34, "1 91 x 0 0 90 1 20.25 1e1 -5.5")).found, HasSubstr("\"x\""));
+  EXPECT_THAT(lenient(replaced(small_bvh, "Frames: 3", "Frames: -3")).found, HasSubstr("-3"));
+  const std::string lost = "nan nan nan nan nan nan nan nan nan nan\n";
+  EXPECT_THAT(lenient(header + lost + lost).found, HasSubstr("nothing but lost frames"));
+  EXPECT_THAT(lenient(replaced(small_bvh, "0.0333333", "0")).remedy, HasSubstr("--rate"));
 }
 
 TEST(BvhBadInput, the_message_names_file_and_line_on_one_line) {
