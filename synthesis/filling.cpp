@@ -278,20 +278,20 @@ std::vector<Miss> misses_of(const FillLibrary& library, const FillOptions& optio
   FeatureMatrix truth(shape.frames(), library.curves());
   library.window(query, 0, shape, truth);
   std::vector<Miss> out;
-  std::vector<Eigen::Vector3d> is;
-  std::vector<Eigen::Vector3d> should;
+  std::vector<JointFrame> is;
+  std::vector<JointFrame> should;
   const auto first = static_cast<std::size_t>(library.layout().joints.front());
   for (std::size_t i = 0; i < estimate.spread.rows.size(); ++i) {
     const Index r = estimate.spread.rows[i];
-    feature_positions(library, estimate.mean.row(r), is);
-    feature_positions(library, truth.row(shape.before + r).cast<double>(), should);
+    feature_frames(library, estimate.mean.row(r), is);
+    feature_frames(library, truth.row(shape.before + r).cast<double>(), should);
     for (std::size_t j = first; j < is.size(); ++j) {
       Miss miss;
       for (std::size_t s = 0; s < miss.variance.size(); ++s) {
         miss.variance[s] = estimate.spread.variance[s](static_cast<Index>(i), static_cast<Index>(j));
       }
       for (int axis = 0; axis < 3; ++axis) {
-        miss.error = is[j](axis) - should[j](axis);
+        miss.error = is[j].position(axis) - should[j].position(axis);
         out.push_back(miss);
       }
     }

@@ -58,6 +58,10 @@ CATCH_ALL = re.compile(r"catch\s*\(\s*\.\.\.\s*\)\s*\{")
 LEFT_OPEN = re.compile(r"\b(?:TODO|FIXME|XXX|HACK)\b")
 # A loop of oneTBB inside of another that has failed returns with steps left out: kinespace/base/parallel.h throws there.
 RAW_LOOP = re.compile(r"\btbb::(?:parallel_\w+|task_group)\b")
+# An object of a thread's own with a destructor is made known to glibc at its first use, and glibc ends the process where it finds no
+# memory for that: no Error, no exit code. Plain numbers and pointers need none.
+THREAD_LOCAL = re.compile(r"\bthread_local\s+(?:(?:static|const|constinit|inline|volatile)\s+)*([^;={(]*)")
+PLAIN = re.compile(r"^(?:(?:unsigned|signed|std::u?int\d+_t|std::size_t|bool|char|short|int|long|float|double)\s+)+(?:\*+\s*)?\w+(?:\[\w*\])*\s*$|^[\w:]+\s*\*+\s*\w+\s*$")
 REPORTS = re.compile(r"\bthrow\b|\bstd::current_exception\b|\bstd::rethrow_exception\b|\breport\w*\s*\(")
 
 
@@ -138,6 +142,12 @@ def loops(root, file, text):
         yield f"{found.group(0)}: call parallel_for of kinespace/base/parallel.h, which throws where steps were left out"
 
 
+def thread_objects(root, file, text):
+    for found in THREAD_LOCAL.finditer(without_comments(text)):
+        if not PLAIN.match(found.group(1) or ""):
+            yield f"{' '.join(found.group(0).split())}: what has a destructor ends the process when memory is short at its first use; let the caller hand the scratch down"
+
+
 def left_open(root, file, text):
     found = LEFT_OPEN.search(text)
     if found:
@@ -149,7 +159,7 @@ def guarded(root, file, text):
         yield "a header without #pragma once"
 
 
-RULES = [arrows, length, catch_all, locale, clocks, loops, left_open, guarded]
+RULES = [arrows, length, catch_all, locale, clocks, loops, thread_objects, left_open, guarded]
 
 
 def findings(root, rules=RULES):
@@ -170,6 +180,7 @@ GOOD = {
     "motion/clip.h": '#pragma once\n#include "kinespace/base/error.h"\n',
     "motion/detail/frame.h": "#pragma once\n",
     "motion/clip.cpp": '#include "kinespace/motion/clip.h"\n#include "kinespace/motion/detail/frame.h"\nvoid f() try { g(); } catch (...) { undo(); throw; }\n',
+    "motion/depth.cpp": "thread_local int depth = 0;\nstatic thread_local const Clip* current = nullptr;\nthread_local std::uint64_t state[4];\n",
     "kernels/tile.cl": "\n",
     "kernels/product.cl": '#include "tile.cl"\n',
     "tests/motion/clip_test.cpp": '#include "kinespace/motion/detail/frame.h"\n#include "tests/support/data.h"\n',
@@ -202,6 +213,10 @@ BREACHES = [
     (clocks, "tests/motion/seed_test.cpp", "EXPECT_LT(std::time(nullptr) - start, 5);\n", "in a test: count"),
     (loops, "fpca/rows.cpp", "void f() { tbb::parallel_for(0, n, body); }\n", "throws where steps were left out"),
     (loops, "bench/each.cpp", "void f() { oneapi::tbb::parallel_for_each(list, body); }\n", "throws where steps were left out"),
+    (thread_objects, "codecs/window.cpp", "void f() { thread_local std::vector<double> values; }\n", "let the caller hand"),
+    (thread_objects, "synthesis/fill.cpp", "static thread_local std::vector<Eigen::Quaterniond> world;\n", "let the caller hand"),
+    (thread_objects, "base/words.h", "#pragma once\nthread_local static Scratch scratch{};\n", "let the caller hand"),
+    (thread_objects, "fpca/turn.cpp", "thread_local Eigen::MatrixXd turn(3, 3);\n", "let the caller hand"),
     (left_open, "base/later.cpp", "// TO" + "DO: finish\n", "left in"),
     (guarded, "base/twice.h", "int x();\n", "without #pragma once"),
 ]

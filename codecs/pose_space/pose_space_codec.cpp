@@ -78,10 +78,11 @@ class PoseSpaceReader final : public ClipReader {
     parallel_for(std::size_t{0}, layout_.groups.size(), [&](std::size_t g) {
       const WindowGroup& group = layout_.groups[g];
       const GroupValues values = decode_values(g, level);
+      WindowScratch scratch;
       for (std::size_t i = 0; i < group.count; ++i) {
         const auto clip = static_cast<std::size_t>(layout_.windows[group.first + i].clip);
         PoseWriter writer(tables_.reference, entry(clip).placement, out[clip]);
-        write_window(values, i, group.first + i, 0, writer);
+        write_window(values, i, group.first + i, 0, writer, scratch);
       }
     });
     return out;
@@ -116,6 +117,7 @@ class PoseSpaceReader final : public ClipReader {
     const int decoded_first = layout_.windows[begin].first;
     const WindowPlace& last = layout_.windows[end - 1];
     Clip out = at_rest(clip, decoded_first, last.first + last.points - decoded_first);
+    WindowScratch scratch;
     for (std::size_t g = 0; g < layout_.groups.size(); ++g) {
       const WindowGroup& group = layout_.groups[g];
       const std::size_t from = std::max(begin, group.first);
@@ -123,7 +125,7 @@ class PoseSpaceReader final : public ClipReader {
       if (from >= to) continue;
       const GroupValues values = decode_values(g, level);
       PoseWriter writer(tables_.reference, entry(clip).placement, out);
-      for (std::size_t w = from; w < to; ++w) write_window(values, w - group.first, w, decoded_first, writer);
+      for (std::size_t w = from; w < to; ++w) write_window(values, w - group.first, w, decoded_first, writer, scratch);
     }
     return cut(std::move(out), first - decoded_first, count);
   }
@@ -137,6 +139,7 @@ class PoseSpaceReader final : public ClipReader {
   [[nodiscard]] std::vector<RunErrors> group_errors(std::size_t g, std::span<const Clip> originals) const {
     const WindowGroup& group = layout_.groups[g];
     const GroupValues values = decode_values(g, -1);
+    WindowScratch scratch;
     std::vector<RunErrors> out;
     for (std::size_t w = group.first; w < group.first + group.count;) {
       const auto clip = static_cast<std::size_t>(layout_.windows[w].clip);
@@ -146,7 +149,7 @@ class PoseSpaceReader final : public ClipReader {
       const int count = layout_.windows[w - 1].first + layout_.windows[w - 1].points - first;
       Clip decoded = at_rest(clip, first, count);
       PoseWriter writer(tables_.reference, entry(clip).placement, decoded);
-      for (std::size_t i = begin; i < w; ++i) write_window(values, i - group.first, i, first, writer);
+      for (std::size_t i = begin; i < w; ++i) write_window(values, i - group.first, i, first, writer, scratch);
       append_joint_errors(originals[clip], decoded, first, count, 0, out.emplace_back(RunErrors{clip, {}}).joints);
     }
     return out;
@@ -155,6 +158,12 @@ class PoseSpaceReader final : public ClipReader {
   struct GroupValues {
     std::vector<double> values;
     std::vector<std::size_t> offsets;
+  };
+
+  // What writing a window needs and the next window of the loop takes up again.
+  struct WindowScratch {
+    WindowSynthesis::Scratch synthesis;
+    std::vector<double> vectors;
   };
 
   [[nodiscard]] static std::span<const Skeleton> known_skeletons(const PoseSpaceBasis* basis) {
@@ -202,16 +211,15 @@ class PoseSpaceReader final : public ClipReader {
   }
 
   void write_window(const GroupValues& values, std::size_t in_group, std::size_t w, int decoded_first,
-                    PoseWriter& writer) const {
+                    PoseWriter& writer, WindowScratch& scratch) const {
     const WindowPlace& window = layout_.windows[w];
     const auto dimensions = static_cast<std::size_t>(tables_.reference.dimensions());
-    thread_local WindowSynthesis::Scratch scratch;
-    thread_local std::vector<double> vectors;
-    vectors.resize(dimensions * static_cast<std::size_t>(window.points));
+    scratch.vectors.resize(dimensions * static_cast<std::size_t>(window.points));
     const std::size_t size =
         static_cast<std::size_t>(tables_.basis.components) * static_cast<std::size_t>(window.functions);
-    synthesis_.synthesise(window, std::span(values.values).subspan(values.offsets[in_group], size), vectors, scratch);
-    writer.write(vectors, window.first - decoded_first, window.points);
+    synthesis_.synthesise(window, std::span(values.values).subspan(values.offsets[in_group], size), scratch.vectors,
+                          scratch.synthesis);
+    writer.write(scratch.vectors, window.first - decoded_first, window.points);
   }
 
   PoseSpaceTables tables_;

@@ -195,7 +195,8 @@ class QbcReader final : public ClipReader {
     }
     Clip out = at_rest(clip, first, count);
     if (found != curves_.layout.joints.end()) {
-      write_joint(clip, static_cast<std::size_t>(found - curves_.layout.joints.begin()), first, count, out);
+      std::vector<double> values;
+      write_joint(clip, static_cast<std::size_t>(found - curves_.layout.joints.begin()), first, count, values, out);
     }
     return out;
   }
@@ -239,7 +240,8 @@ class QbcReader final : public ClipReader {
 
   [[nodiscard]] Clip part(std::size_t clip, int first, int count, int /*level*/) const override {
     Clip out = at_rest(clip, first, count);
-    for (std::size_t j = 0; j < curves_.layout.joints.size(); ++j) write_joint(clip, j, first, count, out);
+    std::vector<double> values;
+    for (std::size_t j = 0; j < curves_.layout.joints.size(); ++j) write_joint(clip, j, first, count, values, out);
     return out;
   }
 
@@ -250,8 +252,9 @@ class QbcReader final : public ClipReader {
     }
   }
 
-  void write_joint(std::size_t clip, std::size_t joint, int first, int count, Clip& out) const {
-    thread_local std::vector<double> values;
+  // `values`: scratch.
+  void write_joint(std::size_t clip, std::size_t joint, int first, int count, std::vector<double>& values,
+                   Clip& out) const {
     values.clear();
     const int dimensions = curve_dimensions(curves_.layout, joint);
     if (dimensions > 0) {

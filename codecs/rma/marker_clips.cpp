@@ -50,6 +50,7 @@ Clip clip_from_markers(const ClipEntry& entry, const Skeleton& skeleton, const M
   const auto d = static_cast<std::size_t>(rig.dimensions());
   std::vector<double> values(d + (with_joints ? 3 * joints.size() : 0));
   std::vector<Eigen::Quaterniond> rotations(joints.size());
+  MarkerRig::Scratch scratch;
   std::vector<double*> tracks;
   tracks.reserve(joints.size());
   for (const int j : joints) tracks.push_back(out.rotation_track(j).data());
@@ -59,7 +60,7 @@ Clip clip_from_markers(const ClipEntry& entry, const Skeleton& skeleton, const M
     markers(f, values);
     for (std::size_t c = 0; c < curves; ++c) at[c] = alignment.curve(static_cast<int>(c))[static_cast<std::size_t>(f)];
     const RigidFrame frame = alignment_frame(std::span(at).first(curves), reference);
-    rig.rotations(std::span(values).first(d), rotations, std::span(values).subspan(d));
+    rig.rotations(std::span(values).first(d), scratch, rotations, std::span(values).subspan(d));
     for (std::size_t j = 1; j < joints.size(); ++j) {
       const Eigen::Quaterniond& q = rotations[j];
       double* to = tracks[j] + 4 * static_cast<std::size_t>(f);

@@ -114,10 +114,9 @@ MarkerRig::MarkerRig(const Skeleton& skeleton) {
   }
 }
 
-void MarkerRig::place(const Eigen::Vector3d& root, std::span<const Eigen::Quaterniond> rotations,
+void MarkerRig::place(const Eigen::Vector3d& root, std::span<const Eigen::Quaterniond> rotations, Scratch& scratch,
                       std::span<double> markers, std::span<double> own) const {
-  thread_local std::vector<Eigen::Matrix3d> turn;
-  thread_local std::vector<Eigen::Vector3d> at;
+  auto& [turn, at] = scratch;
   turn.resize(bones_.size());
   at.resize(bones_.size());
   for (std::size_t k = 0; k < 3; ++k) markers[k] = root[static_cast<Eigen::Index>(k)];
@@ -137,10 +136,9 @@ void MarkerRig::place(const Eigen::Vector3d& root, std::span<const Eigen::Quater
   }
 }
 
-void MarkerRig::rotations(std::span<const double> markers, std::span<Eigen::Quaterniond> rotations,
+void MarkerRig::rotations(std::span<const double> markers, Scratch& scratch, std::span<Eigen::Quaterniond> rotations,
                           std::span<const double> own) const {
-  thread_local std::vector<Eigen::Matrix3d> turn;
-  thread_local std::vector<Eigen::Vector3d> at;
+  auto& [turn, at] = scratch;
   turn.resize(bones_.size());
   at.resize(bones_.size());
   const Eigen::Vector3d root(markers[0], markers[1], markers[2]);
@@ -201,6 +199,7 @@ void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignme
   std::vector<Eigen::Quaterniond> reference;
   for (std::size_t j = 0; j < joints; ++j) reference.push_back(clips.reference.orientation(static_cast<int>(j)));
   std::vector<Eigen::Quaterniond> rotations(joints);
+  MarkerRig::Scratch scratch;
   std::array<double, 7> at{};
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
     const std::size_t f = static_cast<std::size_t>(first) + i;
@@ -218,7 +217,7 @@ void clip_markers(const AlignedClips& clips, std::size_t clip, const RootAlignme
         frame.turn.conjugate() * (Eigen::Vector3d(v[0], v[frames], v[2 * frames]) - frame.position);
     const auto d = static_cast<std::size_t>(rig.dimensions());
     const std::size_t stride = d + (with_joints ? 3 * joints : 0);
-    rig.place(root, rotations, {out + i * stride, d}, {out + i * stride + d, stride - d});
+    rig.place(root, rotations, scratch, {out + i * stride, d}, {out + i * stride + d, stride - d});
   }
 }
 

@@ -44,14 +44,20 @@ class MarkerRig {
   [[nodiscard]] int joint_count() const { return static_cast<int>(bones_.size()); }
   [[nodiscard]] int dimensions() const { return 3 + 6 * joint_count(); }
 
+  // What both ways need for one posture, kept by the caller from one to the next.
+  struct Scratch {
+    std::vector<Eigen::Matrix3d> turn;  // by rotating joint: how it is turned,
+    std::vector<Eigen::Vector3d> at;    // where it is
+  };
+
   // Markers of a posture: where the root is, its rotation and the local rotations of the other rotating joints
   // (Skeleton::rotating_joints()), in the frame of alignment. `own`: where the joints are, [joint][x y z], if wanted.
-  void place(const Eigen::Vector3d& root, std::span<const Eigen::Quaterniond> rotations, std::span<double> markers,
-             std::span<double> own = {}) const;
+  void place(const Eigen::Vector3d& root, std::span<const Eigen::Quaterniond> rotations, Scratch& scratch,
+             std::span<double> markers, std::span<double> own = {}) const;
 
   // The rotations that markers show, likewise. Same bits on every machine; markers that show none (all in one point)
   // leave the joint at rest. `own`, if given: where the markers have the joints; they then tell directions from there.
-  void rotations(std::span<const double> markers, std::span<Eigen::Quaterniond> rotations,
+  void rotations(std::span<const double> markers, Scratch& scratch, std::span<Eigen::Quaterniond> rotations,
                  std::span<const double> own = {}) const;
 
  private:

@@ -17,17 +17,17 @@ constexpr WindowPrior far_prior{.scale_m = 0.1};
 // d positions (cm) / d features at one row: [3 joint + axis][curve].
 Eigen::MatrixXd position_slopes(const FillLibrary& library, const Eigen::RowVectorXd& row) {
   constexpr double step = 1e-4;
-  std::vector<Vector3d> base;
-  std::vector<Vector3d> moved;
-  feature_positions(library, row, base);
+  std::vector<JointFrame> base;
+  std::vector<JointFrame> moved;
+  feature_frames(library, row, base);
   Eigen::MatrixXd out(3 * static_cast<Index>(base.size()), row.size());
   Eigen::RowVectorXd other = row;
   for (Index c = 0; c < row.size(); ++c) {
     other(c) = row(c) + step;
-    feature_positions(library, other, moved);
+    feature_frames(library, other, moved);
     other(c) = row(c);
     for (std::size_t j = 0; j < base.size(); ++j) {
-      out.col(c).segment<3>(3 * static_cast<Index>(j)) = (moved[j] - base[j]) / step;
+      out.col(c).segment<3>(3 * static_cast<Index>(j)) = (moved[j].position - base[j].position) / step;
     }
   }
   return out;
@@ -67,27 +67,23 @@ std::vector<int> spread_rows(const WindowShape& shape) {
 
 }  // namespace
 
-void feature_positions(const FillLibrary& library, const Eigen::RowVectorXd& features, std::vector<Vector3d>& out) {
+void feature_frames(const FillLibrary& library, const Eigen::RowVectorXd& features, std::vector<JointFrame>& out) {
   const Skeleton& skeleton = library.skeleton();
   const std::vector<int>& joints = library.layout().joints;
   const Eigen::RowVectorXd& weights = library.weights();
   const auto count = static_cast<std::size_t>(skeleton.joint_count());
-  const Vector3d root = 100 * features.head<3>().transpose();
-  out.assign(count, root);
-  static thread_local std::vector<Eigen::Quaterniond> world;
-  world.assign(count, Eigen::Quaterniond::Identity());
+  out.assign(count, {.position = 100 * features.head<3>().transpose()});
   std::size_t next = 0;
   for (auto j = static_cast<std::size_t>(joints.front()); j < count; ++j) {
     const Joint& joint = skeleton.joints[j];
     if (next > 0) {
-      const auto parent = static_cast<std::size_t>(joint.parent);
-      out[j] = out[parent] + world[parent] * joint.offset;
-      world[j] = world[parent];
+      const JointFrame& parent = out[static_cast<std::size_t>(joint.parent)];
+      out[j] = {.rotation = parent.rotation, .position = parent.position + parent.rotation * joint.offset};
     }
     if (next >= joints.size() || joints[next] != static_cast<int>(j)) continue;
     const Eigen::Vector4d q =
         features.segment<4>(3 + 4 * static_cast<Index>(next)).transpose() / weights(3 + 4 * static_cast<Index>(next));
-    world[j] = world[j] * Eigen::Quaterniond(q(0), q(1), q(2), q(3)).normalized();
+    out[j].rotation = out[j].rotation * Eigen::Quaterniond(q(0), q(1), q(2), q(3)).normalized();
     ++next;
   }
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kinespace/base/progress.h"
+#include "kinespace/motion/kinematics.h"
 #include "kinespace/synthesis/detail/filling_estimate.h"
 #include "kinespace/synthesis/detail/filling_library.h"
 #include "kinespace/synthesis/filling.h"
@@ -31,10 +32,9 @@ struct GapEstimate {
 [[nodiscard]] GapEstimate estimate_gap(const FillLibrary& library, const FillOptions& options, const FillTrack& query,
                                        const WindowShape& shape, FillLibrary::Search search);
 
-// World positions (cm; ground position and heading of the features) of all joints for one row of features. Joints above
-// the travel root stand at the travel root.
-void feature_positions(const FillLibrary& library, const Eigen::RowVectorXd& features,
-                       std::vector<Eigen::Vector3d>& out);
+// World frames (ground position and heading of the features) of all joints for one row of features; `out` is resized.
+// Joints above the travel root stand at the travel root.
+void feature_frames(const FillLibrary& library, const Eigen::RowVectorXd& features, std::vector<JointFrame>& out);
 
 // How the sources add up to a variance, by the gap's length, and how often a standard deviation is not exceeded.
 struct FillCalibration {

@@ -27,11 +27,12 @@ std::vector<Eigen::Quaterniond> some_rotations(int joints, int seed) {
 // The largest angle between what goes in and what comes back.
 double round_trip(const Skeleton& skeleton, int seed) {
   const MarkerRig rig(skeleton);
+  MarkerRig::Scratch scratch;
   const auto there = some_rotations(rig.joint_count(), seed);
   std::vector<double> markers(static_cast<std::size_t>(rig.dimensions()));
-  rig.place({1, 2, 3}, there, markers);
+  rig.place({1, 2, 3}, there, scratch, markers);
   std::vector<Eigen::Quaterniond> back(there.size());
-  rig.rotations(markers, back);
+  rig.rotations(markers, scratch, back);
   double largest = 0;
   for (std::size_t j = 0; j < there.size(); ++j) {
     largest = std::max(largest, 2 * (there[j].conjugate() * back[j]).vec().norm());
@@ -58,22 +59,24 @@ TEST(RmaMarkers, bones_without_length_keep_their_twist) {
 TEST(RmaMarkers, markers_of_bones_that_are_no_longer_rigid_are_aimed_at) {
   const Skeleton& skeleton = test::sample_clips().front().skeleton;
   const MarkerRig rig(skeleton);
+  MarkerRig::Scratch scratch;
   const auto there = some_rotations(rig.joint_count(), 3);
   std::vector<double> markers(static_cast<std::size_t>(rig.dimensions()));
-  rig.place({0, 0, 0}, there, markers);
+  rig.place({0, 0, 0}, there, scratch, markers);
   for (std::size_t i = 3; i < markers.size(); ++i) markers[i] += 0.01 * std::sin(7.0 * static_cast<double>(i));
   std::vector<Eigen::Quaterniond> back(there.size());
-  rig.rotations(markers, back);
+  rig.rotations(markers, scratch, back);
   std::vector<double> again(markers.size());
-  rig.place({0, 0, 0}, back, again);
+  rig.place({0, 0, 0}, back, scratch, again);
   // Nothing piles up along the limbs: every marker is off by no more than a few times what it was moved by.
   for (std::size_t i = 0; i < markers.size(); ++i) EXPECT_NEAR(again[i], markers[i], 0.05) << i;
 }
 
 TEST(RmaMarkers, markers_in_one_point_give_a_posture_all_the_same) {
   const MarkerRig rig(test::sample_clips().front().skeleton);
+  MarkerRig::Scratch scratch;
   std::vector<Eigen::Quaterniond> back(static_cast<std::size_t>(rig.joint_count()));
-  rig.rotations(std::vector<double>(static_cast<std::size_t>(rig.dimensions()), 0.0), back);
+  rig.rotations(std::vector<double>(static_cast<std::size_t>(rig.dimensions()), 0.0), scratch, back);
   for (const Eigen::Quaterniond& q : back) EXPECT_NEAR(q.norm(), 1, 1e-12);
 }
 

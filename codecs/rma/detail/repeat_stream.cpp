@@ -156,7 +156,7 @@ std::vector<double> RepeatDecoder::plain_part(std::size_t w) const {
   const auto [offset, size] = group->places[w - layout_.plain.groups[g].first];
   std::vector<double> out(static_cast<std::size_t>(tables_.tables.reference.dimensions()) *
                           static_cast<std::size_t>(window.points));
-  thread_local WindowSynthesis::Scratch scratch;
+  WindowSynthesis::Scratch scratch;
   synthesis_.synthesise(window, std::span(group->values[is_predicted ? 1 : 0]).subspan(offset, size), out, scratch);
   return out;
 }
