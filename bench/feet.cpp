@@ -262,9 +262,10 @@ BenchReport bench_feet(const BenchOptions& options) {
   }
   rows.add_cleanup("raw blends of walks", outcomes(raw_blends(), true), true);
   for (const auto& [folder, data, level] :
-       {std::tuple("02", "cmu 02, walks and more", true), std::tuple("03", "cmu 03, uneven ground", false),
-        std::tuple("01", "cmu 01, climbing", false)}) {
-    rows.add_cleanup(data, outcomes(captured(options.data / "cmu" / folder, rows), true), level);
+       {std::tuple("cmu/02", "cmu 02, walks and more", true), std::tuple("cmu/03", "cmu 03, uneven ground", false),
+        std::tuple("cmu/01", "cmu 01, climbing", false), std::tuple("foreign/xia31", "foreign/xia31, 120 Hz", false),
+        std::tuple("foreign/hips15", "foreign/hips15, 30 Hz", false)}) {
+    rows.add_cleanup(data, outcomes(captured(options.data / folder, rows), true), level);
   }
   return report;
 }
