@@ -37,7 +37,8 @@
 namespace kinespace {
 
 // `source_name` stands in messages; the clip is named after it, without folder and ending.
-[[nodiscard]] Clip parse_bvh(std::string_view text, const std::string& source_name, const ClipReadOptions& options = {});
+[[nodiscard]] Clip parse_bvh(std::string_view text, const std::string& source_name,
+                             const ClipReadOptions& options = {});
 [[nodiscard]] Clip read_bvh(const std::filesystem::path& path);
 // Of a file with several ROOTs each is a clip, NAME.1 and so on; options.animation is a number or the name of a ROOT.
 [[nodiscard]] std::vector<Clip> read_bvh(const std::filesystem::path& path, const ClipReadOptions& options,

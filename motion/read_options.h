@@ -18,7 +18,7 @@ enum class ClipsWanted : std::uint8_t {
 struct ClipReadOptions {
   std::optional<std::filesystem::path> companion;  // the .asf of an .amc; else found beside it
   std::string animation;                           // one of several in the file, by its name or its number from 1
-  bool strict = false;            // what is mended otherwise, with a note, is an error: a frame count that is wrong, say
+  bool strict = false;  // what is mended otherwise, with a note, is an error: a frame count that is wrong, say
   std::optional<double> rate_hz;  // instead of the file's own, frames a second; > 0
   // Told which frames the file has not, first and last, both included: the frame before stands there.
   std::function<void(int first, int last)> lost;
