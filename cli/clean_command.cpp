@@ -25,7 +25,6 @@ struct CleanCommandOptions {
   std::optional<double> floor_cm;
   std::optional<std::filesystem::path> library;
   std::optional<std::filesystem::path> picture;
-  bool strict = false;
   bool json = false;
 };
 
@@ -77,7 +76,7 @@ void run_clean(const CleanCommandOptions& options, Session& session) {
   if (options.picture) before = clip;
   const CleanResult result = clean(std::move(clip), clean_options);
   Session::check_stop();
-  session.doubt_result(doubts_about(result.report), options.strict);
+  session.doubt_result(doubts_about(result.report), options.choice.strict);
   write_clip(options.output, result.clip);
   if (options.picture) write_picture(*options.picture, *before, result);
   const Json out = to_json(options, result);
@@ -93,12 +92,12 @@ void add_clean(CLI::App& app, Session& session) {
   command->add_option("-o,--output", options->output, "The file to write: " + listed(clip_endings_written()))
       ->required();
   add_clip_choice(command, options->choice);
+  command->get_option("--strict")
+      ->description("Refuse a file that needs mending, and a result that is worse than its input: nothing is written");
   command->add_option("--feet", options->feet, "The ankle joints as LEFT,RIGHT; found by name and shape otherwise");
   command->add_option("--floor", options->floor_cm, "The floor is flat at this height in cm; estimated otherwise");
   command->add_option("--library", options->library, "Use the contact labels of this library (kinespace contacts)");
   command->add_option("--picture", options->picture, "Also write stick figures with the plants marked, .svg");
-  command->add_flag("--strict", options->strict,
-                    "A result that is worse than its input is an error: nothing is written");
   command->add_flag("--json", options->json, "Print the figures as one JSON object");
   session.files.reads(command, {"IN", "--library"});
   session.files.writes(command, {"--output"});

@@ -160,7 +160,8 @@ bool believable(const Ground& slope, const std::vector<Rest>& rests, const FootT
     feet[static_cast<std::size_t>(r->slot / 2)] = true;
   }
   if (places.size() < 3 || !feet[0] || !feet[1]) return false;
-  const auto held = std::ranges::count_if(t.root, [&](const Eigen::Vector3d& p) { return p.y() > slope.at(p) + 0.3 * leg; });
+  const auto held =
+      std::ranges::count_if(t.root, [&](const Eigen::Vector3d& p) { return p.y() > slope.at(p) + 0.3 * leg; });
   return static_cast<double>(held) >= 0.95 * t.frames;
 }
 

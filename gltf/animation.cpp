@@ -140,7 +140,8 @@ double even_rate(std::span<const float> times) {
     const double off = std::abs(static_cast<double>(times[i]) - first - static_cast<double>(i) * step);
     if (off > 0.01 * step + blur) return 0;
   }
-  return simplest(1 / step, 1 / step * 2 * blur / (last - first));
+  constexpr double least_rate_hz = 0.0005;  // keys so far apart are no frames
+  return 1 / step < least_rate_hz ? 0 : simplest(1 / step, 1 / step * 2 * blur / (last - first));
 }
 
 std::vector<std::string> animation_names(const Document& document) {

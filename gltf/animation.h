@@ -39,7 +39,7 @@ struct AnimatedValue {
                                                          const Accessors& accessors);
 
 // The rate of times that are evenly spaced to within a hundredth of a step and what 32-bit floats blur; 0 when they are
-// not, or there are fewer than two. Of the rates that the floats could stand for, the one of the fewest decimals.
+// not, or lie more than half an hour apart, or there are fewer than two. Of the rates that the floats could stand for, the one of the fewest decimals.
 [[nodiscard]] double even_rate(std::span<const float> times);
 
 // What animations are called: their names; "2" for a second one without a name, "walk (2)" for the second walk. Slashes

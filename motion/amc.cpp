@@ -85,7 +85,8 @@ class AmcParser {
       if (!asf.bones[j].dofs.empty()) ++wanted_;
     }
     read_head();
-    const std::int64_t frames = options.strict ? honest_frames() : numbered_frames(honest_frames());
+    const FrameLines lines = frame_lines();
+    const std::int64_t frames = options.strict ? honest_frames(lines) : numbered_frames(lines);
     require_honest_size(source, asf.bones.size(), frames);
     clip_ = make_clip(std::move(name), asf.skeleton, rate_of_clip(), static_cast<int>(frames));
     for (const BoneColumns& columns : layout_) {
@@ -150,10 +151,28 @@ class AmcParser {
 
   // The lines from here on that hold a frame's number. memchr finds line ends several times as fast as a loop; a file
   // without LF has CR alone.
-  [[nodiscard]] std::int64_t count_frame_lines() const {
-    std::int64_t frames = 0;
-    for_each_frame_line([&](const char* /*at*/) { ++frames; });
-    return frames;
+  struct FrameLines {
+    std::int64_t count = 0;
+    std::int64_t first = -1, last = -1;  // numbers
+    std::int64_t least = 0, most = 0;    // steps from one to the next
+  };
+  [[nodiscard]] FrameLines frame_lines() const {
+    FrameLines out;
+    for_each_frame_line([&](const char* at) {
+      ++out.count;
+      std::int64_t number = 0;
+      const auto [stop, code] = std::from_chars(at, source_.end(), number);
+      if (code != std::errc()) number = out.last;  // told when it is read
+      if (out.count == 1) {
+        out.first = number;
+      } else {
+        const std::int64_t step = number - out.last;
+        out.least = out.count == 2 ? step : std::min(out.least, step);
+        out.most = out.count == 2 ? step : std::max(out.most, step);
+      }
+      out.last = number;
+    });
+    return out;
   }
   template <typename Visit>
   void for_each_frame_line(const Visit& visit) const {
@@ -171,14 +190,14 @@ class AmcParser {
 
   // How many frames to make room for: no more than the file can hold, whatever it claims. A file with more frame lines
   // than that lacks bones in some frame, which is found when that frame is read.
-  [[nodiscard]] std::int64_t honest_frames() const {
+  [[nodiscard]] std::int64_t honest_frames(const FrameLines& lines) const {
     std::size_t least =
         2;  // bytes of the shortest frame: its number, and for each bone the name, the values, a line end
     for (std::size_t j = 0; j < asf_.bones.size(); ++j) {
       if (!asf_.bones[j].dofs.empty()) least += asf_.skeleton.joints[j].name.size() + 2 * asf_.bones[j].dofs.size() + 1;
     }
     const auto possible = static_cast<std::int64_t>(source_.size() / least + 1);
-    return std::clamp<std::int64_t>(count_frame_lines(), 1,
+    return std::clamp<std::int64_t>(lines.count, 1,
                                     std::min<std::int64_t>(possible, std::numeric_limits<int>::max()));
   }
 
@@ -199,21 +218,9 @@ class AmcParser {
 
   // How the numbers of frames go up, before any frame is read: by a step of their own, or with gaps. Where they do
   // neither, reading finds the place.
-  std::int64_t numbered_frames(std::int64_t lines) {
-    std::int64_t first = -1, last = -1, least = 0, most = 0;
-    for_each_frame_line([&](const char* at) {
-      std::int64_t number = 0;
-      const auto [stop, code] = std::from_chars(at, source_.end(), number);
-      if (code != std::errc()) number = last;  // told when it is read
-      if (first < 0) {
-        first = number;
-      } else {
-        const std::int64_t step = number - last;
-        least = least == 0 ? step : std::min(least, step);
-        most = std::max(most, step);
-      }
-      last = number;
-    });
+  std::int64_t numbered_frames(const FrameLines& of_file) {
+    const std::int64_t lines = honest_frames(of_file);
+    const auto& [count, first, last, least, most] = of_file;
     if (least < 1 || (least == 1 && most == 1)) return lines;
     step_ = least;
     if (least == most) {

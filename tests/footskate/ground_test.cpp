@@ -34,7 +34,7 @@ TEST(GroundEstimate, does_not_mind_feet_that_skate) {
 
 // A plane goes through any three places: feet that rest at two heights, as of one who kneels, are no slope.
 TEST(GroundEstimate, believes_no_slope_from_a_few_places) {
-  Clip clip = make_walk({.duration_s = 0.7}).clip;
+  Clip clip = make_walk({.duration_s = 0.5}).clip;
   EXPECT_NE(ground_of(test::on_slope(clip, 0.4)).kind, GroundKind::slope) << "two steps";
   EXPECT_EQ(ground_of(test::on_slope(make_walk({.duration_s = 6}).clip, 0.4)).kind, GroundKind::slope);
 }

@@ -87,7 +87,10 @@ TEST_F(GltfBuffers, count_as_input_where_memory_is_bounded) {
   json["bufferViews"].push_back(view_of(0, 9'000'000));
   json["accessors"][0] = accessor_of(2, 5126, 750'000, "VEC3");
   // 16 times the vertices that are there: 288 MB and more, which the .gltf file alone would not be worth.
-  for (int i = 1; i < 16; ++i) json["nodes"].push_back({{"mesh", 0}});
+  for (int i = 1; i < 16; ++i) {
+    json["nodes"].push_back({{"mesh", 0}});
+    if (json.contains("scenes")) json["scenes"][0]["nodes"].push_back(i);
+  }
   write_file_atomically(model_ / "a.gltf", json.dump());
   write_file_atomically(model_ / "a.bin", std::string(9'000'000, '\0'));
   EXPECT_EQ(read_mesh_sequence(model_ / "a.gltf").vertices, 12'000'000);

@@ -208,7 +208,10 @@ const std::map<std::string, std::function<Json(int n)>>& greedy() {
        [](int n) {
          Json out = triangle();
          for (int i = 0; i < n; ++i) out["skins"][0]["joints"].push_back(0);
-         for (int i = 0; i < n; ++i) out["nodes"].push_back({{"mesh", 0}, {"skin", 0}});
+         for (int i = 0; i < n; ++i) {
+           out["scenes"][0]["nodes"].push_back(out["nodes"].size());
+           out["nodes"].push_back({{"mesh", 0}, {"skin", 0}});
+         }
          return out;
        }},
       {"channels",
