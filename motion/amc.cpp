@@ -197,8 +197,7 @@ class AmcParser {
       if (!asf_.bones[j].dofs.empty()) least += asf_.skeleton.joints[j].name.size() + 2 * asf_.bones[j].dofs.size() + 1;
     }
     const auto possible = static_cast<std::int64_t>(source_.size() / least + 1);
-    return std::clamp<std::int64_t>(lines.count, 1,
-                                    std::min<std::int64_t>(possible, std::numeric_limits<int>::max()));
+    return std::clamp<std::int64_t>(lines.count, 1, std::min<std::int64_t>(possible, std::numeric_limits<int>::max()));
   }
 
   // Stores the block when it is full.
