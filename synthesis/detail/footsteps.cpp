@@ -148,8 +148,8 @@ class LegTask {
     const int turn_frames = std::max(1, static_cast<int>(settle_s * feet_.rate_hz));
     int last = steps_.first_of_second;
     while (last + 1 < feet_.frames && feet_.second.stands[leg_][last + 1] != 0) ++last;
-    // A stance that outlasts what is looked at lets go of its offset slowly.
-    const bool outlasts = last + 1 == feet_.frames;
+    // A stance that outlasts what is looked at, or leaves no time after it, lets go of its offset slowly.
+    const bool outlasts = last + 1 + turn_frames >= feet_.frames;
     const int fade_from = std::max(steps_.first_of_second, feet_.end);
     for (int f = steps_.first_of_second; f <= last; ++f) {
       const double turn_share = 1 - eased(static_cast<double>(f - steps_.first_of_second) / turn_frames);
@@ -161,7 +161,7 @@ class LegTask {
       if (angle > 0) goal.rotation = Eigen::AngleAxisd(angle, turned.normalized()) * goal.rotation;
       give(f, goal);
     }
-    return last + 1 < feet_.frames ? std::min(feet_.frames, last + 1 + turn_frames) : feet_.frames;
+    return outlasts ? last + 1 : last + 1 + turn_frames;
   }
 
   // A foot that goes from one place to another is lifted at least so high in the middle of its way.
@@ -220,11 +220,12 @@ void take_footsteps(Clip& blend, const FootTracks& tracks, const Ground& ground,
   GuidedFeet guide{
       .tasks = {LegTask(feet, 0, plan.legs[0], ankles[0]).make(), LegTask(feet, 1, plan.legs[1], ankles[1]).make()},
       .root_share = {}};
-  // The root is at home at both ends of what is looked at.
+  // The root is at home at both ends of what is looked at, also where that is the overlap alone.
+  const int inside = std::min(static_cast<int>(0.15 * feet.rate_hz), (feet.end - feet.begin) / 2);
+  const double coming = std::max({1, feet.begin, inside});
+  const double going = std::max({1, feet.frames - feet.end, inside});
   for (int f = 0; f < feet.frames; ++f) {
-    const double before = f < feet.begin ? static_cast<double>(f) / feet.begin : 1;
-    const double after = f >= feet.end ? static_cast<double>(feet.frames - 1 - f) / (feet.frames - feet.end) : 1;
-    guide.root_share.push_back(eased(std::min(before, after)));
+    guide.root_share.push_back(eased(std::min({f / coming, (feet.frames - 1 - f) / going, 1.0})));
   }
   guide_feet(blend, tracks, ground, guide);
 }
