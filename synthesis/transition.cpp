@@ -48,7 +48,8 @@ struct Source {
     level = foot_level(tracks);
     motion = foot_motion(tracks, level);
     // Finding contacts takes memory that grows with the clip.
-    contacts_known = plan_feet && clip.rate_hz >= least_contact_rate_hz && (known || clip.frames <= most_frames_with_feet);
+    contacts_known =
+        plan_feet && clip.rate_hz >= least_contact_rate_hz && (known || clip.frames <= most_frames_with_feet);
     if (!contacts_known) return;
     const FootContacts contacts = known ? *known : ContactModel::standard().detect(tracks, level.ground);
     for (int leg = 0; leg < 2; ++leg) {
